@@ -1,0 +1,1 @@
+//! Cameras and the projection of triangles onto a raster.

@@ -1,0 +1,1 @@
+//! Pictures: rasters, colours, text and PNG.

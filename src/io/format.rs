@@ -1,0 +1,350 @@
+//! The formats, and telling them apart.
+
+use crate::error::Fault;
+
+/// The kinds of things a file can hold.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Kind {
+    /// Triangles, polylines, points.
+    Mesh,
+    /// Voxels.
+    Volume,
+}
+
+impl Kind {
+    /// Lower-case name.
+    pub fn name(self) -> &'static str {
+        match self {
+            Kind::Mesh => "mesh",
+            Kind::Volume => "volume",
+        }
+    }
+}
+
+/// A file format.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Format {
+    /// Wavefront OBJ.
+    Obj,
+    /// Stanford PLY.
+    Ply,
+    /// STL.
+    Stl,
+    /// Object File Format.
+    Off,
+    /// glTF 2.0, JSON.
+    Gltf,
+    /// glTF 2.0, binary.
+    Glb,
+    /// Nearly Raw Raster Data.
+    Nrrd,
+    /// MetaImage header with a data file.
+    Mhd,
+    /// MetaImage in one file.
+    Mha,
+    /// NumPy array.
+    Npy,
+    /// binvox.
+    Binvox,
+    /// VTK image data, XML.
+    Vti,
+    /// OpenVDB.
+    Vdb,
+    /// scantle's sparse voxel octree.
+    Svo,
+}
+
+/// What of a mesh a format can hold beside triangles.
+#[derive(Debug, Clone, Copy)]
+#[allow(missing_docs)]
+pub struct Holds {
+    pub polygons: bool,
+    pub segments: bool,
+    pub points: bool,
+    pub normals: bool,
+    pub colors: bool,
+}
+
+/// A row of the table of formats.
+struct Row {
+    format: Format,
+    name: &'static str,
+    extensions: &'static [&'static str],
+    kind: Kind,
+    read: bool,
+    write: bool,
+    about: &'static str,
+}
+
+const fn row(
+    format: Format,
+    extensions: &'static [&'static str],
+    kind: Kind,
+    (read, write): (bool, bool),
+    about: &'static str,
+) -> Row {
+    Row {
+        format,
+        name: extensions[0],
+        extensions,
+        kind,
+        read,
+        write,
+        about,
+    }
+}
+
+const TABLE: &[Row] = &[
+    row(
+        Format::Obj,
+        &["obj"],
+        Kind::Mesh,
+        (true, true),
+        "Wavefront OBJ: faces, lines and points",
+    ),
+    row(
+        Format::Ply,
+        &["ply"],
+        Kind::Mesh,
+        (true, true),
+        "Stanford PLY, ascii and binary of both byte orders; written binary",
+    ),
+    row(
+        Format::Stl,
+        &["stl"],
+        Kind::Mesh,
+        (true, true),
+        "STL, ascii and binary; written binary",
+    ),
+    row(
+        Format::Off,
+        &["off", "coff"],
+        Kind::Mesh,
+        (true, true),
+        "OFF and its variants with colours and normals",
+    ),
+    row(
+        Format::Gltf,
+        &["gltf"],
+        Kind::Mesh,
+        (true, false),
+        "glTF 2.0: all nodes of the default scene, placed",
+    ),
+    row(
+        Format::Glb,
+        &["glb"],
+        Kind::Mesh,
+        (true, true),
+        "glTF 2.0 in one binary file",
+    ),
+    row(
+        Format::Nrrd,
+        &["nrrd"],
+        Kind::Volume,
+        (true, true),
+        "NRRD, raw, gzip and ascii; written raw",
+    ),
+    row(
+        Format::Mhd,
+        &["mhd"],
+        Kind::Volume,
+        (true, true),
+        "MetaImage: a header and a data file",
+    ),
+    row(
+        Format::Mha,
+        &["mha"],
+        Kind::Volume,
+        (true, true),
+        "MetaImage in one file",
+    ),
+    row(
+        Format::Npy,
+        &["npy"],
+        Kind::Volume,
+        (true, true),
+        "NumPy array of three dimensions, indexed [z, y, x]",
+    ),
+    row(
+        Format::Binvox,
+        &["binvox"],
+        Kind::Volume,
+        (true, true),
+        "binvox: bits of a cubic grid, run-length coded",
+    ),
+    row(
+        Format::Vti,
+        &["vti"],
+        Kind::Volume,
+        (false, true),
+        "VTK image data in XML",
+    ),
+    row(
+        Format::Vdb,
+        &["vdb"],
+        Kind::Volume,
+        (false, true),
+        "OpenVDB, a grid of bool",
+    ),
+    row(
+        Format::Svo,
+        &["svo"],
+        Kind::Volume,
+        (true, true),
+        "scantle's sparse voxel octree: 8-bit child masks, breadth first",
+    ),
+];
+
+impl Format {
+    /// All formats, in the order of the table.
+    pub fn all() -> impl Iterator<Item = Format> {
+        TABLE.iter().map(|row| row.format)
+    }
+
+    fn row(self) -> &'static Row {
+        TABLE
+            .iter()
+            .find(|row| row.format == self)
+            .expect("every format has a row")
+    }
+
+    /// The name used by options and reports.
+    pub fn name(self) -> &'static str {
+        self.row().name
+    }
+
+    /// File name extensions, the usual one first.
+    pub fn extensions(self) -> &'static [&'static str] {
+        self.row().extensions
+    }
+
+    /// What it holds.
+    pub fn kind(self) -> Kind {
+        self.row().kind
+    }
+
+    /// Whether it is read.
+    pub fn is_read(self) -> bool {
+        self.row().read
+    }
+
+    /// Whether it is written.
+    pub fn is_written(self) -> bool {
+        self.row().write
+    }
+
+    /// One line about it.
+    pub fn about(self) -> &'static str {
+        self.row().about
+    }
+
+    /// The format of a name.
+    pub fn from_name(name: &str) -> Option<Format> {
+        TABLE
+            .iter()
+            .find(|row| row.name == name)
+            .map(|row| row.format)
+    }
+
+    /// The format of a file name extension, in any case.
+    pub fn from_extension(extension: &str) -> Option<Format> {
+        let wanted = extension.to_ascii_lowercase();
+        TABLE
+            .iter()
+            .find(|row| row.extensions.contains(&wanted.as_str()))
+            .map(|row| row.format)
+    }
+
+    /// What a mesh may have beside triangles and be held by the writer of this format.
+    pub fn holds(self) -> Holds {
+        match self {
+            Format::Obj => Holds {
+                polygons: true,
+                segments: true,
+                points: true,
+                normals: false,
+                colors: false,
+            },
+            Format::Ply => Holds {
+                polygons: true,
+                segments: true,
+                points: true,
+                normals: true,
+                colors: true,
+            },
+            Format::Off => Holds {
+                polygons: true,
+                segments: false,
+                points: false,
+                normals: false,
+                colors: true,
+            },
+            Format::Glb => Holds {
+                polygons: false,
+                segments: true,
+                points: true,
+                normals: true,
+                colors: true,
+            },
+            _ => Holds {
+                polygons: false,
+                segments: false,
+                points: false,
+                normals: false,
+                colors: false,
+            },
+        }
+    }
+}
+
+/// Tells the format by the first bytes, and by the extension where they do not tell.
+pub fn sniff(bytes: &[u8], extension: Option<&str>) -> Result<Format, Fault> {
+    let by_name = extension.and_then(Format::from_extension);
+    if bytes.starts_with(b"ply\n") || bytes.starts_with(b"ply\r") {
+        return Ok(Format::Ply);
+    }
+    if bytes.starts_with(b"glTF") {
+        return Ok(Format::Glb);
+    }
+    if bytes.starts_with(b"NRRD000") {
+        return Ok(Format::Nrrd);
+    }
+    if bytes.starts_with(b"\x93NUMPY") {
+        return Ok(Format::Npy);
+    }
+    if bytes.starts_with(b"#binvox") {
+        return Ok(Format::Binvox);
+    }
+    if bytes.starts_with(super::svo::MAGIC) {
+        return Ok(Format::Svo);
+    }
+    if bytes.starts_with(super::vdb::MAGIC) {
+        return Ok(Format::Vdb);
+    }
+    if by_name == Some(Format::Stl) || super::stl::is_binary(bytes) {
+        return Ok(Format::Stl);
+    }
+    if let Some(format) = by_name {
+        return Ok(format);
+    }
+    let text = bytes.trim_ascii_start();
+    if text.starts_with(b"solid") {
+        return Ok(Format::Stl);
+    }
+    if super::off::has_keyword(text) {
+        return Ok(Format::Off);
+    }
+    if text.starts_with(b"{") {
+        return Ok(Format::Gltf);
+    }
+    let names: Vec<_> = Format::all()
+        .filter(|f| f.is_read())
+        .map(Format::name)
+        .collect();
+    Err(
+        Fault::whole("neither its first bytes nor its name tell the format").with_hint(format!(
+            "name it with --input-format, one of: {}",
+            names.join(", ")
+        )),
+    )
+}

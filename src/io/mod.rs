@@ -1,0 +1,236 @@
+//! Files: opening, telling formats apart, one reader or writer per format.
+//!
+//! Readers keep what a file holds, in its order, and never repair. They refuse what a header
+//! claims but the bytes do not hold before they make room for it. A gzip layer is taken off
+//! whatever the file is called. Nothing outside the named file is read, but for the data file
+//! that a glTF, OBJ or MetaImage header names in the same folder or below.
+
+pub mod binvox;
+pub mod format;
+pub mod gltf;
+pub mod metaimage;
+pub mod npy;
+pub mod nrrd;
+pub mod obj;
+pub mod off;
+pub mod ply;
+pub mod sink;
+pub mod source;
+pub mod stl;
+pub mod svo;
+pub mod vdb;
+pub mod vti;
+
+use crate::error::{Error, Fault, Result};
+use crate::mesh::{Mesh, Polygons};
+use crate::report::{Input, Output, Warning};
+use crate::volume::Volume;
+use format::{Format, Kind};
+use sink::Sink;
+use source::Source;
+use std::io::Write;
+
+/// What a file holds, as one of the kinds that scantle knows.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Content {
+    /// Triangles, polylines, points.
+    Mesh(Mesh),
+    /// Voxels.
+    Volume(Volume),
+}
+
+/// Reads a file of any kind.
+///
+/// Returns what it holds, its line for the report, and counted warnings about what looks wrong.
+pub fn read(source: &Source, format: Option<Format>) -> Result<(Content, Input, Vec<Warning>)> {
+    let malformed = |fault| Error::Malformed {
+        path: source.path().to_owned(),
+        fault,
+    };
+    let format = match format {
+        Some(format) => format,
+        None => format::sniff(source.bytes(), source.extension()).map_err(malformed)?,
+    };
+    if source.bytes().is_empty() {
+        return Err(malformed(Fault::whole("the file is empty")));
+    }
+    let mut warnings = Vec::new();
+    let (content, digest) =
+        rayon::join(|| parse(source, format, &mut warnings), || source.sha256());
+    let content = content.map_err(malformed)?;
+    let described = match &content {
+        Content::Mesh(mesh) => mesh.content(),
+        Content::Volume(volume) => volume.content(),
+    };
+    let input = Input {
+        path: source.name().to_owned(),
+        format: format.name().to_owned(),
+        bytes: source.stored_bytes(),
+        sha256: digest,
+        content: described,
+    };
+    Ok((content, input, warnings))
+}
+
+fn parse(source: &Source, format: Format, warnings: &mut Vec<Warning>) -> Result<Content, Fault> {
+    let content = match format {
+        Format::Obj => Content::Mesh(obj::read(source, warnings)?),
+        Format::Ply => Content::Mesh(ply::read(source, warnings)?),
+        Format::Stl => Content::Mesh(stl::read(source, warnings)?),
+        Format::Off => Content::Mesh(off::read(source, warnings)?),
+        Format::Gltf | Format::Glb => Content::Mesh(gltf::read(source, warnings)?),
+        Format::Nrrd => Content::Volume(nrrd::read(source, warnings)?),
+        Format::Mhd | Format::Mha => Content::Volume(metaimage::read(source, warnings)?),
+        Format::Npy => Content::Volume(npy::read(source, warnings)?),
+        Format::Binvox => Content::Volume(binvox::read(source, warnings)?),
+        Format::Svo => Content::Volume(svo::read(source, warnings)?),
+        Format::Vti | Format::Vdb => {
+            return Err(Fault::whole(format!(
+                "{} files are written, not read",
+                format.name()
+            )));
+        }
+    };
+    match &content {
+        Content::Mesh(mesh) => mesh.check()?,
+        Content::Volume(volume) => volume.check()?,
+    }
+    Ok(content)
+}
+
+/// Reads a mesh; a file of another kind is an error.
+pub fn read_mesh(source: &Source, format: Option<Format>) -> Result<(Mesh, Input, Vec<Warning>)> {
+    match read(source, format)? {
+        (Content::Mesh(mesh), input, warnings) => Ok((mesh, input, warnings)),
+        (Content::Volume(_), input, _) => Err(wrong_kind(source, &input.format, "volume", "mesh")),
+    }
+}
+
+/// Reads a volume; a file of another kind is an error.
+pub fn read_volume(
+    source: &Source,
+    format: Option<Format>,
+) -> Result<(Volume, Input, Vec<Warning>)> {
+    match read(source, format)? {
+        (Content::Volume(volume), input, warnings) => Ok((volume, input, warnings)),
+        (Content::Mesh(_), input, _) => Err(wrong_kind(source, &input.format, "mesh", "volume")),
+    }
+}
+
+fn wrong_kind(source: &Source, format: &str, found: &str, wanted: &str) -> Error {
+    let fault = Fault::whole(format!(
+        "holds a {found} ({format}), but a {wanted} is needed"
+    ));
+    Error::Malformed {
+        path: source.path().to_owned(),
+        fault,
+    }
+}
+
+/// Writes a mesh. Returns the lines for the report and warnings about what the format cannot hold.
+pub fn write_mesh(mesh: &Mesh, sink: &Sink, format: Format) -> Result<(Vec<Output>, Vec<Warning>)> {
+    let writer: fn(&Mesh, &mut dyn Write) -> std::io::Result<()> = match format {
+        Format::Obj => obj::write,
+        Format::Ply => ply::write,
+        Format::Stl => stl::write,
+        Format::Off => off::write,
+        Format::Glb => gltf::write,
+        _ => return Err(cannot_hold(format, Kind::Mesh)),
+    };
+    let output = sink.write(format, |out| writer(mesh, out))?;
+    Ok((vec![output], dropped(mesh, format)))
+}
+
+/// Writes a volume. MHD writes two files: the header and, beside it, the data.
+pub fn write_volume(
+    volume: &Volume,
+    sink: &Sink,
+    format: Format,
+) -> Result<(Vec<Output>, Vec<Warning>)> {
+    let writer: fn(&Volume, &mut dyn Write) -> std::io::Result<()> = match format {
+        Format::Nrrd => nrrd::write,
+        Format::Mha => metaimage::write,
+        Format::Mhd => {
+            return metaimage::write_pair(volume, sink).map(|outputs| (outputs, Vec::new()));
+        }
+        Format::Npy => npy::write,
+        Format::Binvox => binvox::write,
+        Format::Vti => vti::write,
+        Format::Vdb => vdb::write,
+        Format::Svo => svo::write,
+        _ => return Err(cannot_hold(format, Kind::Volume)),
+    };
+    if let Some(problem) = refusal(volume, format) {
+        return Err(Error::parameter("output-format", format.name(), problem));
+    }
+    let output = sink.write(format, |out| writer(volume, out))?;
+    Ok((vec![output], Vec::new()))
+}
+
+/// Why a volume cannot be held by a format, if it cannot.
+fn refusal(volume: &Volume, format: Format) -> Option<String> {
+    let binary = volume.is_binary();
+    match format {
+        Format::Svo | Format::Vdb | Format::Binvox if !binary => Some(format!(
+            "holds bits only, and the voxels are {}",
+            volume.data.sample_type()
+        )),
+        Format::Binvox => binvox::refusal(volume),
+        Format::Svo if !volume.frame.is_straight() => {
+            Some("holds grids along the coordinate axes only".into())
+        }
+        _ => None,
+    }
+}
+
+fn cannot_hold(format: Format, kind: Kind) -> Error {
+    Error::parameter(
+        "output-format",
+        format.name(),
+        format!("does not hold a {}, or is not written", kind.name()),
+    )
+}
+
+/// What of a mesh a format leaves out.
+fn dropped(mesh: &Mesh, format: Format) -> Vec<Warning> {
+    let mut lost = Vec::new();
+    let mut note = |code: &str, what: &str, count: usize| {
+        if count > 0 {
+            lost.push(Warning::new(
+                code,
+                format!("{} files hold no {what}; left out", format.name()),
+                count as u64,
+                None,
+            ));
+        }
+    };
+    let holds = format.holds();
+    if !holds.normals {
+        note(
+            "dropped-normals",
+            "vertex normals",
+            mesh.normals.as_ref().map_or(0, Vec::len),
+        );
+    }
+    if !holds.colors {
+        note(
+            "dropped-colours",
+            "vertex colours",
+            mesh.colors.as_ref().map_or(0, Vec::len),
+        );
+    }
+    if !holds.segments {
+        note("dropped-segments", "polylines", mesh.segments.len());
+    }
+    if !holds.points {
+        note("dropped-points", "points", mesh.points.len());
+    }
+    if !holds.polygons {
+        note(
+            "split-polygons",
+            "faces of more than three corners",
+            mesh.polygons.as_ref().map_or(0, Polygons::len),
+        );
+    }
+    lost
+}

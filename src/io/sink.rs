@@ -1,0 +1,188 @@
+//! Where outputs go: beside the target and renamed, or to standard output.
+
+use super::format::Format;
+use crate::error::{Error, Result};
+use crate::report::Output;
+use sha2::{Digest, Sha256};
+use std::fmt::Write as _;
+use std::fs;
+use std::io::{self, BufWriter, Write};
+use std::path::{Path, PathBuf};
+
+/// A file to be written, or standard output.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Sink {
+    /// A file; replaced in one step when all is written.
+    File(PathBuf),
+    /// Standard output.
+    Stdout,
+}
+
+impl Sink {
+    /// The sink of a command line word: `-` is standard output.
+    pub fn new(word: &str) -> Self {
+        if word == "-" {
+            Sink::Stdout
+        } else {
+            Sink::File(PathBuf::from(word))
+        }
+    }
+
+    /// The path as given.
+    pub fn path(&self) -> &Path {
+        match self {
+            Sink::File(path) => path,
+            Sink::Stdout => Path::new("-"),
+        }
+    }
+
+    /// Whether the content is to be packed with gzip: the name ends in `.gz`.
+    pub fn is_gzip(&self) -> bool {
+        self.path()
+            .extension()
+            .is_some_and(|e| e.eq_ignore_ascii_case("gz"))
+    }
+
+    /// The format that the name asks for, looking below a final `.gz`.
+    pub fn format(&self) -> Option<Format> {
+        let path = self.path();
+        let below = if self.is_gzip() {
+            path.with_extension("")
+        } else {
+            path.to_owned()
+        };
+        Format::from_extension(below.extension()?.to_str()?)
+    }
+
+    /// Writes one file whole: nothing is left behind, and nothing is replaced, on failure.
+    ///
+    /// The content goes to a new file in the target's folder, is synced and renamed.
+    pub fn write(
+        &self,
+        format: Format,
+        content: impl FnOnce(&mut dyn Write) -> io::Result<()>,
+    ) -> Result<Output> {
+        let failed = |source| Error::Write {
+            path: self.path().to_owned(),
+            source,
+        };
+        let (bytes, sha256) = match self {
+            Sink::Stdout => {
+                fill(io::stdout().lock(), self.is_gzip(), content)
+                    .map_err(failed)?
+                    .1
+            }
+            Sink::File(path) => {
+                let folder = path
+                    .parent()
+                    .filter(|p| !p.as_os_str().is_empty())
+                    .unwrap_or(Path::new("."));
+                if path.is_dir() {
+                    return Err(failed(io::Error::new(
+                        io::ErrorKind::IsADirectory,
+                        "is a folder",
+                    )));
+                }
+                let file = tempfile::Builder::new()
+                    .prefix(".scantle-")
+                    .permissions_of_new_files()
+                    .tempfile_in(folder)
+                    .map_err(failed)?;
+                let (file, figures) = fill(file, self.is_gzip(), content).map_err(failed)?;
+                if let Ok(old) = fs::metadata(path) {
+                    file.as_file()
+                        .set_permissions(old.permissions())
+                        .map_err(failed)?;
+                }
+                file.as_file().sync_all().map_err(failed)?;
+                file.persist(path).map_err(|e| failed(e.error))?;
+                figures
+            }
+        };
+        Ok(Output {
+            path: self.path().display().to_string(),
+            format: format.name().to_owned(),
+            bytes,
+            sha256,
+        })
+    }
+}
+
+/// New files get the permissions that the user's umask gives, not the private ones of temporary files.
+trait PermissionsOfNewFiles {
+    fn permissions_of_new_files(&mut self) -> &mut Self;
+}
+
+impl PermissionsOfNewFiles for tempfile::Builder<'_, '_> {
+    #[cfg(unix)]
+    fn permissions_of_new_files(&mut self) -> &mut Self {
+        use std::os::unix::fs::PermissionsExt;
+        self.permissions(fs::Permissions::from_mode(0o666))
+    }
+
+    #[cfg(not(unix))]
+    fn permissions_of_new_files(&mut self) -> &mut Self {
+        self
+    }
+}
+
+/// Bytes written and their SHA-256.
+type Figures = (u64, String);
+
+fn fill<W: Write>(
+    target: W,
+    gzip: bool,
+    content: impl FnOnce(&mut dyn Write) -> io::Result<()>,
+) -> io::Result<(W, Figures)> {
+    let mut out = BufWriter::with_capacity(
+        1 << 18,
+        Counted {
+            target,
+            hash: Sha256::new(),
+            bytes: 0,
+        },
+    );
+    if gzip {
+        let mut packer = flate2::write::GzEncoder::new(&mut out, flate2::Compression::default());
+        content(&mut packer)?;
+        packer.finish()?;
+    } else {
+        content(&mut out)?;
+    }
+    let mut counted = out.into_inner().map_err(io::IntoInnerError::into_error)?;
+    counted.target.flush()?;
+    Ok((
+        counted.target,
+        (counted.bytes, hexadecimal(&counted.hash.finalize())),
+    ))
+}
+
+/// Counts and hashes what passes.
+struct Counted<W> {
+    target: W,
+    hash: Sha256,
+    bytes: u64,
+}
+
+impl<W: Write> Write for Counted<W> {
+    fn write(&mut self, buffer: &[u8]) -> io::Result<usize> {
+        let written = self.target.write(buffer)?;
+        self.hash.update(&buffer[..written]);
+        self.bytes += written as u64;
+        Ok(written)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.target.flush()
+    }
+}
+
+/// Bytes as lower-case hexadecimal digits.
+pub fn hexadecimal(bytes: &[u8]) -> String {
+    bytes
+        .iter()
+        .fold(String::with_capacity(2 * bytes.len()), |mut text, byte| {
+            let _ = write!(text, "{byte:02x}");
+            text
+        })
+}

@@ -1,0 +1,31 @@
+//! Geometry processing that measures the error it makes.
+//!
+//! Each algorithm is a function of an input, a `Params` and a [`progress::Progress`]; it returns
+//! its output and a `Stats` that becomes the `result` of the JSON report. Nothing in here prints,
+//! exits or opens a file outside [`io`].
+//!
+//! Modules stand in layers and import downwards only (`tests/layers.rs` holds them to it):
+//!
+//! | layer | modules |
+//! |---|---|
+//! | 0 | [`error`] [`progress`] [`report`] |
+//! | 1 | [`numeric`] |
+//! | 2 | [`spatial`] [`image`] |
+//! | 3 | [`mesh`] [`camera`] |
+//! | 4 | [`volume`] |
+//! | 5 | [`render`] |
+//! | 6 | [`measure`] [`io`] (used by commands alone) |
+#![deny(clippy::print_stdout, clippy::print_stderr)]
+
+pub mod camera;
+pub mod error;
+pub mod image;
+pub mod io;
+pub mod measure;
+pub mod mesh;
+pub mod numeric;
+pub mod progress;
+pub mod render;
+pub mod report;
+pub mod spatial;
+pub mod volume;

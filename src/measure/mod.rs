@@ -1,0 +1,1 @@
+//! Judging results: errors between two things of one kind.

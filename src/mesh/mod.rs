@@ -1,0 +1,183 @@
+//! Meshes: triangles, polylines and points over one list of vertices.
+
+pub mod polygon;
+pub mod shapes;
+
+use crate::error::Fault;
+use crate::numeric::vector::Vec3;
+use crate::report::Content;
+use crate::spatial::aabb::Aabb;
+use rayon::prelude::*;
+
+/// A mesh as a file holds it: nothing welded, reordered or repaired.
+///
+/// Vertex indices count from 0. Faces of more than three corners are kept in `polygons` and appear
+/// in `triangles` as the triangles they were split into, in face order.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Mesh {
+    /// Vertex positions, in the file's unit.
+    pub positions: Vec<Vec3>,
+    /// Triangles, counter-clockwise from outside where the file is oriented.
+    pub triangles: Vec<[u32; 3]>,
+    /// The faces as stored; `None` when every face is a triangle.
+    pub polygons: Option<Polygons>,
+    /// Segments of polylines.
+    pub segments: Vec<[u32; 2]>,
+    /// Vertices that stand for themselves (a point cloud; glTF or OBJ points).
+    pub points: Vec<u32>,
+    /// One unit normal per vertex.
+    pub normals: Option<Vec<Vec3>>,
+    /// One colour per vertex: red, green, blue, alpha from 0 to 1, as stored.
+    pub colors: Option<Vec<[f32; 4]>>,
+}
+
+/// Faces of any number of corners: face `f` has corners `corners[starts[f]..starts[f + 1]]`.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Polygons {
+    /// Offsets into `corners`, one more than there are faces.
+    pub starts: Vec<u32>,
+    /// Vertex indices.
+    pub corners: Vec<u32>,
+}
+
+impl Polygons {
+    /// Number of faces.
+    pub fn len(&self) -> usize {
+        self.starts.len().saturating_sub(1)
+    }
+
+    /// Whether there is no face.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// The faces, each as its corners.
+    pub fn iter(&self) -> impl Iterator<Item = &[u32]> {
+        self.starts
+            .windows(2)
+            .map(|w| &self.corners[w[0] as usize..w[1] as usize])
+    }
+}
+
+impl Mesh {
+    /// A mesh of triangles alone.
+    pub fn from_triangles(positions: Vec<Vec3>, triangles: Vec<[u32; 3]>) -> Self {
+        Mesh {
+            positions,
+            triangles,
+            ..Mesh::default()
+        }
+    }
+
+    /// Number of faces as stored.
+    pub fn face_count(&self) -> usize {
+        self.polygons
+            .as_ref()
+            .map_or(self.triangles.len(), Polygons::len)
+    }
+
+    /// The three corners of triangle `t`.
+    #[inline]
+    pub fn corners(&self, t: usize) -> [Vec3; 3] {
+        self.triangles[t].map(|v| self.positions[v as usize])
+    }
+
+    /// The box around all vertices.
+    pub fn bounds(&self) -> Aabb {
+        self.positions
+            .par_chunks(1 << 14)
+            .map(|chunk| Aabb::around(chunk))
+            .reduce(|| Aabb::EMPTY, Aabb::union)
+    }
+
+    /// Whether nothing in it has a place: no triangle, segment or point.
+    pub fn is_empty(&self) -> bool {
+        self.triangles.is_empty() && self.segments.is_empty() && self.points.is_empty()
+    }
+
+    /// What every reader promises: finite coordinates, indices in range, attributes of one length.
+    pub fn check(&self) -> Result<(), Fault> {
+        let bad = self
+            .positions
+            .par_iter()
+            .position_first(|p| !p.iter().all(|c| c.is_finite()));
+        if let Some(v) = bad {
+            let [x, y, z] = self.positions[v];
+            return Err(Fault::element(
+                "vertex",
+                v,
+                format!("coordinates ({x}, {y}, {z}) are not finite"),
+            ));
+        }
+        let count = self.positions.len();
+        let out = |indices: &[u32]| indices.iter().copied().find(|v| *v as usize >= count);
+        let refers = |kind, index, v| {
+            Fault::element(
+                kind,
+                index,
+                format!("refers to vertex {v}, but there are {count}"),
+            )
+        };
+        if let Some(polygons) = &self.polygons {
+            if let Some((f, v)) = polygons
+                .iter()
+                .enumerate()
+                .find_map(|(f, face)| out(face).map(|v| (f, v)))
+            {
+                return Err(refers("face", f, v));
+            }
+        }
+        let bad = self
+            .triangles
+            .par_iter()
+            .position_first(|t| t.iter().any(|v| *v as usize >= count));
+        if let Some(t) = bad {
+            return Err(refers(
+                "face",
+                t,
+                out(&self.triangles[t]).unwrap_or_default(),
+            ));
+        }
+        if let Some((s, v)) = self
+            .segments
+            .iter()
+            .enumerate()
+            .find_map(|(s, seg)| out(seg).map(|v| (s, v)))
+        {
+            return Err(refers("segment", s, v));
+        }
+        if let Some((p, v)) = self
+            .points
+            .iter()
+            .enumerate()
+            .find_map(|(p, v)| out(&[*v]).map(|v| (p, v)))
+        {
+            return Err(refers("point", p, v));
+        }
+        let normals = self.normals.as_ref().map(Vec::len);
+        let colors = self.colors.as_ref().map(Vec::len);
+        for (what, length) in [("normals", normals), ("colours", colors)] {
+            if let Some(length) = length.filter(|length| *length != count) {
+                return Err(Fault::whole(format!(
+                    "{length} {what} for {count} vertices"
+                )));
+            }
+        }
+        Ok(())
+    }
+
+    /// Counts and bounds for a report.
+    pub fn content(&self) -> Content {
+        let bounds = self.bounds();
+        let some = |n: usize| (n > 0).then_some(n as u64);
+        Content {
+            vertices: Some(self.positions.len() as u64),
+            faces: Some(self.face_count() as u64),
+            triangles: Some(self.triangles.len() as u64),
+            segments: some(self.segments.len()),
+            points: some(self.points.len()),
+            bounds: (!bounds.is_empty()).then_some([bounds.lo, bounds.hi]),
+            ..Content::default()
+        }
+    }
+}

@@ -1,0 +1,1 @@
+//! Polygons: splitting a face of many corners into triangles.

@@ -1,0 +1,1 @@
+//! Shapes made by formula, for fixtures, tests and benches.

@@ -1,0 +1,207 @@
+//! The report every command makes: one envelope, one vocabulary.
+
+use schemars::JsonSchema;
+use serde::Serialize;
+
+/// The version of the envelope. Adding a field keeps it; renaming or removing one raises it.
+pub const SCHEMA: u32 = 1;
+
+/// The report of one run over one input (or one set of inputs).
+#[derive(Debug, Clone, Serialize, JsonSchema)]
+pub struct Report<P, R> {
+    /// Version of this envelope.
+    pub schema: u32,
+    /// Version of scantle.
+    pub scantle: String,
+    /// The command that ran.
+    pub command: String,
+    /// What was read.
+    pub input: Vec<Input>,
+    /// What was written.
+    pub output: Vec<Output>,
+    /// Every effective parameter, defaults included.
+    pub parameters: P,
+    /// What the command found or made.
+    pub result: R,
+    /// The error made; an array where the command has several measures.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub accuracy: Option<Measures>,
+    /// How much of the full model was built.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub modelled: Option<Modelled>,
+    /// What looks wrong but could be worked with.
+    pub warnings: Vec<Warning>,
+    /// What varies from run to run; only with `--timings`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub run: Option<Run>,
+}
+
+/// A file that was read.
+#[derive(Debug, Clone, Serialize, JsonSchema)]
+pub struct Input {
+    /// As given on the command line; `-` is standard input.
+    pub path: String,
+    /// Its format, as `scantle formats` names it.
+    pub format: String,
+    /// Size in bytes, as stored.
+    pub bytes: u64,
+    /// SHA-256 of the bytes as stored, in hexadecimal.
+    pub sha256: String,
+    /// Counts and bounds as read.
+    #[serde(flatten)]
+    pub content: Content,
+}
+
+/// What a file holds.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, JsonSchema)]
+pub struct Content {
+    /// Vertices of a mesh.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub vertices: Option<u64>,
+    /// Faces as stored, of any number of corners.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub faces: Option<u64>,
+    /// Triangles after faces of more corners are split.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub triangles: Option<u64>,
+    /// Segments of polylines.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub segments: Option<u64>,
+    /// Points that stand alone.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub points: Option<u64>,
+    /// Voxels along x, y, z.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub dims: Option<[u64; 3]>,
+    /// Type of a voxel.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub sample_type: Option<String>,
+    /// Smallest and largest coordinate: `[[x, y, z], [x, y, z]]`, null when there is none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub bounds: Option<[[f64; 3]; 2]>,
+}
+
+/// A file that was written.
+#[derive(Debug, Clone, Serialize, JsonSchema)]
+pub struct Output {
+    /// Where; `-` is standard output.
+    pub path: String,
+    /// Its format, as `scantle formats` names it.
+    pub format: String,
+    /// Size in bytes, as stored.
+    pub bytes: u64,
+    /// SHA-256 of the bytes as stored, in hexadecimal.
+    pub sha256: String,
+}
+
+/// One measure of the error made, or several.
+#[derive(Debug, Clone, Serialize, JsonSchema)]
+#[serde(untagged)]
+pub enum Measures {
+    /// The only one.
+    One(Accuracy),
+    /// All of them, in a fixed order.
+    Many(Vec<Accuracy>),
+}
+
+/// One measure of the error made.
+#[derive(Debug, Clone, Serialize, JsonSchema)]
+pub struct Accuracy {
+    /// What is measured.
+    pub measure: String,
+    /// In which unit.
+    pub unit: String,
+    /// A proven upper bound, null where none is.
+    pub bound: Option<f64>,
+    /// The measured error, null where it was not measured.
+    pub reached: Option<f64>,
+    /// What it is measured against, or what proves the bound.
+    pub reference: String,
+    /// Whether `reached` was measured against that reference in this run.
+    pub verified: bool,
+}
+
+/// How much of the full model was built.
+#[derive(Debug, Clone, Serialize, JsonSchema)]
+pub struct Modelled {
+    /// What is counted.
+    pub unit: String,
+    /// How many were made.
+    pub made: u64,
+    /// How many the full model has.
+    pub full: u64,
+    /// `made / full`.
+    pub share: f64,
+    /// Bytes of what was made.
+    pub bytes: u64,
+}
+
+impl Modelled {
+    /// The share follows from the two counts; an empty full model has share 0.
+    pub fn new(unit: &str, made: u64, full: u64, bytes: u64) -> Self {
+        let share = if full == 0 {
+            0.0
+        } else {
+            made as f64 / full as f64
+        };
+        Modelled {
+            unit: unit.to_owned(),
+            made,
+            full,
+            share,
+            bytes,
+        }
+    }
+}
+
+/// Something that looks wrong but can be worked with.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, JsonSchema)]
+pub struct Warning {
+    /// Stable name for programs: `degenerate-triangles`.
+    pub code: String,
+    /// For a person.
+    pub message: String,
+    /// How many there are.
+    pub count: u64,
+    /// Index of the first, where it has one (counted from 0; lines from 1).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub first: Option<u64>,
+}
+
+impl Warning {
+    /// A counted warning.
+    pub fn new(code: &str, message: impl Into<String>, count: u64, first: Option<u64>) -> Self {
+        Warning {
+            code: code.to_owned(),
+            message: message.into(),
+            count,
+            first,
+        }
+    }
+}
+
+/// What varies from run to run.
+#[derive(Debug, Clone, Serialize, JsonSchema)]
+pub struct Run {
+    /// Seconds from start to report.
+    pub wall_s: f64,
+    /// Processor seconds, all threads together.
+    pub cpu_s: f64,
+    /// Largest resident memory in bytes, null where the system does not tell.
+    pub peak_bytes: Option<u64>,
+    /// Worker threads.
+    pub threads: usize,
+    /// The steps, in order; they add up to the whole.
+    pub stages: Vec<Stage>,
+}
+
+/// One step of a run.
+#[derive(Debug, Clone, Serialize, JsonSchema)]
+pub struct Stage {
+    /// `read`, the algorithm's own steps, `write`.
+    pub name: String,
+    /// Seconds.
+    pub wall_s: f64,
+    /// Processor seconds, all threads together.
+    pub cpu_s: f64,
+}

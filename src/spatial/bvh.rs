@@ -1,0 +1,1 @@
+//! A bounding volume hierarchy with leaves of the caller.

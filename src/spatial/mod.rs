@@ -1,0 +1,4 @@
+//! Space: boxes and search structures over them.
+
+pub mod aabb;
+pub mod bvh;

@@ -1,0 +1,1 @@
+//! The surface of a binary volume as a mesh of voxel faces.
