@@ -1,0 +1,303 @@
+//! Which voxel centres are inside: by parity, and by winding number.
+//!
+//! Both come from one list: where the lines through voxel centres along x cross the surface. The
+//! parity of a centre is that of the crossings before it. Its winding number is the sum of the
+//! signs of these crossings, less what the surface's border takes away (see [`super::winding`]),
+//! which is nothing for a closed surface. So a closed mesh costs one pass over its triangles, and
+//! parity and winding number agree or disagree by whole numbers.
+
+use super::kernel::{self, Clip};
+use super::raster::Surface;
+use super::winding::Border;
+use super::{Fill, Lattice};
+use crate::progress::Progress;
+use crate::volume::bits::BitGrid;
+use crate::volume::octree::{TILE, Tile};
+use rayon::prelude::*;
+
+/// Triangles per task.
+const CHUNK: usize = 8192;
+
+/// A run of voxels `x0..x1` in a row of a tile row: `row` is `64 z + y` within it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+struct Run {
+    row: u32,
+    x0: u32,
+    x1: u32,
+}
+
+/// The voxels whose centres are inside, as runs along x.
+#[derive(Debug, Clone)]
+pub struct Filling {
+    dims: [usize; 3],
+    /// For each row of tiles along x, `tz * tiles_y + ty`, its runs by row and place.
+    rows: Vec<Vec<Run>>,
+    /// Centres that parity and winding number judge differently.
+    pub disagreeing: u64,
+    /// Whether the surface was taken inside out, because it encloses more negative than positive space.
+    pub inverted: bool,
+}
+
+/// What a tile holds.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum TileState {
+    /// Nothing.
+    Empty,
+    /// Everything.
+    Full,
+    /// Something.
+    Mixed,
+}
+
+/// The runs of a row of tiles along x.
+pub struct TileRow<'a> {
+    runs: &'a [Run],
+    /// Rows that fill each tile, and rows that touch it.
+    covered: Vec<(u32, u32)>,
+}
+
+impl TileRow<'_> {
+    /// What tile `tx` holds.
+    pub fn state(&self, tx: usize) -> TileState {
+        match self.covered[tx] {
+            (_, 0) => TileState::Empty,
+            (full, _) if full as usize == TILE * TILE => TileState::Full,
+            _ => TileState::Mixed,
+        }
+    }
+
+    /// Sets the voxels of tile `tx`.
+    pub fn set(&self, tx: usize, tile: &mut Tile) {
+        let (lo, hi) = ((tx * TILE) as u32, ((tx + 1) * TILE) as u32);
+        for run in self.runs.iter().filter(|r| r.x0 < hi && r.x1 > lo) {
+            let (x0, x1) = (run.x0.max(lo) - lo, run.x1.min(hi) - 1 - lo);
+            tile.set_run(
+                x0 as usize,
+                x1 as usize,
+                run.row as usize % TILE,
+                run.row as usize / TILE,
+            );
+        }
+    }
+}
+
+impl Filling {
+    /// The centres that are inside the surface by `rule`.
+    pub fn new(
+        surface: &Surface,
+        rule: Fill,
+        lattice: &Lattice,
+        border: &Border,
+        progress: &dyn Progress,
+    ) -> Self {
+        let dims = lattice.dims;
+        let keys = crossings(surface, dims, progress);
+        let inverted = enclosed(&keys, dims[0]) < 0;
+        let [_, ty, tz] = dims.map(|d| d.div_ceil(TILE));
+        progress.stage("fill", (ty * tz) as u64);
+        // Empty tile rows have no crossing, and without a border nothing else can fill them.
+        let groups: Vec<&[u64]> = {
+            let mut rest = keys.as_slice();
+            (0..ty * tz)
+                .map(|row| {
+                    let (group, after) =
+                        rest.split_at(rest.partition_point(|k| (k >> ROW_SHIFT) as usize <= row));
+                    rest = after;
+                    group
+                })
+                .collect()
+        };
+        let made: Vec<(Vec<Run>, u64)> = groups
+            .into_par_iter()
+            .enumerate()
+            .map(|(row, keys)| {
+                let at = [row % ty, row / ty];
+                let made = tile_row(keys, at, dims, rule, border, inverted);
+                progress.advance(1);
+                made
+            })
+            .collect();
+        let disagreeing = made.iter().map(|(_, n)| n).sum();
+        Filling {
+            dims,
+            rows: made.into_iter().map(|(runs, _)| runs).collect(),
+            disagreeing,
+            inverted,
+        }
+    }
+
+    /// Number of centres inside.
+    pub fn count(&self) -> u64 {
+        self.rows
+            .par_iter()
+            .map(|runs| runs.iter().map(|r| u64::from(r.x1 - r.x0)).sum::<u64>())
+            .sum()
+    }
+
+    /// The runs of one row of tiles.
+    pub fn tile_row(&self, ty: usize, tz: usize) -> TileRow<'_> {
+        let runs = self.rows[tz * self.dims[1].div_ceil(TILE) + ty].as_slice();
+        let mut covered = vec![(0, 0); self.dims[0].div_ceil(TILE)];
+        // Several runs of one row may touch a tile; each counts, which only ever makes "touched" larger.
+        for run in runs {
+            for tx in run.x0 as usize / TILE..=(run.x1 as usize - 1) / TILE {
+                let full = run.x0 as usize <= tx * TILE && run.x1 as usize >= (tx + 1) * TILE;
+                covered[tx].0 += u32::from(full);
+                covered[tx].1 += 1;
+            }
+        }
+        TileRow { runs, covered }
+    }
+
+    /// Sets the voxels in a dense grid.
+    pub fn set(&self, grid: &mut BitGrid) {
+        let [_, ny, _] = self.dims;
+        let tiles_y = ny.div_ceil(TILE);
+        let stride = grid.stride();
+        grid.words_mut()
+            .par_chunks_mut(stride * ny)
+            .enumerate()
+            .for_each(|(z, slice)| {
+                for ty in 0..tiles_y {
+                    let runs = self.rows[z / TILE * tiles_y + ty].as_slice();
+                    let first = (z % TILE * TILE) as u32;
+                    let from = runs.partition_point(|r| r.row < first);
+                    for run in runs[from..]
+                        .iter()
+                        .take_while(|r| r.row < first + TILE as u32)
+                    {
+                        let y = ty * TILE + run.row as usize % TILE;
+                        let row = &mut slice[y * stride..(y + 1) * stride];
+                        crate::volume::bits::set_run(row, run.x0 as usize, run.x1 as usize);
+                    }
+                }
+            });
+    }
+}
+
+/// A crossing is packed as row of tiles, row within it, voxel, and direction, so that sorting the
+/// numbers sorts the crossings.
+const ROW_SHIFT: u32 = 32;
+
+fn crossings(surface: &Surface, dims: [usize; 3], progress: &dyn Progress) -> Vec<u64> {
+    let clip = Clip::grid(dims);
+    let tiles_y = dims[1].div_ceil(TILE) as u64;
+    let count = surface.triangle_count();
+    progress.stage("crossings", count as u64);
+    let chunks: Vec<Vec<u64>> = (0..count.div_ceil(CHUNK))
+        .into_par_iter()
+        .map(|chunk| {
+            let mut keys = Vec::new();
+            let last = ((chunk + 1) * CHUNK).min(count);
+            for index in chunk * CHUNK..last {
+                let q = surface.primitive(index);
+                kernel::crossings(&q, &clip, &mut |x, y, z, turn| {
+                    if x < dims[0] as i32 {
+                        let tile_row = z as u64 / TILE as u64 * tiles_y + y as u64 / TILE as u64;
+                        let row = (z as u64 % TILE as u64) * TILE as u64 + y as u64 % TILE as u64;
+                        let leaves = u64::from(surface.is_reversed(index) != (turn > 0));
+                        keys.push(
+                            tile_row << ROW_SHIFT | row << 20 | (x.max(0) as u64) << 1 | leaves,
+                        );
+                    }
+                });
+            }
+            progress.advance((last - chunk * CHUNK) as u64);
+            keys
+        })
+        .collect();
+    let mut keys = chunks.concat();
+    keys.par_sort_unstable();
+    keys
+}
+
+fn voxel(key: u64) -> u32 {
+    (key >> 1 & 0x7_ffff) as u32
+}
+
+fn row_of(key: u64) -> u32 {
+    (key >> 20 & 0xfff) as u32
+}
+
+/// 1 for a crossing into the surface, -1 for one out of it.
+fn step(key: u64) -> i64 {
+    1 - 2 * (key & 1) as i64
+}
+
+/// The sum of the crossings' winding over all voxels of the grid.
+fn enclosed(keys: &[u64], nx: usize) -> i64 {
+    keys.par_iter()
+        .map(|key| step(*key) * (nx as i64 - i64::from(voxel(*key))))
+        .sum()
+}
+
+/// The runs of one row of tiles, and the number of centres that the two rules judge differently.
+fn tile_row(
+    keys: &[u64],
+    at: [usize; 2],
+    dims: [usize; 3],
+    rule: Fill,
+    border: &Border,
+    inverted: bool,
+) -> (Vec<Run>, u64) {
+    let nx = dims[0] as u32;
+    let steps = border.steps(at, dims);
+    let mut runs: Vec<Run> = Vec::new();
+    let mut disagreeing = 0;
+    let (mut key, mut next) = (0, 0);
+    loop {
+        let row = match (
+            keys.get(key).map(|k| row_of(*k)),
+            steps.get(next).map(|s| s.row),
+        ) {
+            (None, None) => break,
+            (a, b) => a.unwrap_or(u32::MAX).min(b.unwrap_or(u32::MAX)),
+        };
+        // Walk both lists along the row: between two events all is constant.
+        let (mut winding, mut odd, mut taken) = (0i64, false, 0i64);
+        let mut x = 0;
+        while x < nx {
+            while keys
+                .get(key)
+                .is_some_and(|k| row_of(*k) == row && voxel(*k) <= x)
+            {
+                winding += step(keys[key]);
+                odd = !odd;
+                key += 1;
+            }
+            while steps.get(next).is_some_and(|s| s.row == row && s.x <= x) {
+                taken = steps[next].whole;
+                next += 1;
+            }
+            let until = |at: Option<u32>| at.unwrap_or(nx).min(nx);
+            let end = until(
+                keys.get(key)
+                    .filter(|k| row_of(**k) == row)
+                    .map(|k| voxel(*k)),
+            )
+            .min(until(steps.get(next).filter(|s| s.row == row).map(|s| s.x)));
+            // The winding number less the border's share is above one half (below minus one half
+            // where the surface is inside out).
+            let wound = if inverted {
+                winding < taken
+            } else {
+                winding > taken
+            };
+            if wound != odd {
+                disagreeing += u64::from(end - x);
+            }
+            if if rule == Fill::Parity { odd } else { wound } {
+                match runs.last_mut().filter(|r| r.row == row && r.x1 == x) {
+                    Some(run) => run.x1 = end,
+                    None => runs.push(Run {
+                        row,
+                        x0: x,
+                        x1: end,
+                    }),
+                }
+            }
+            x = end;
+        }
+    }
+    (runs, disagreeing)
+}

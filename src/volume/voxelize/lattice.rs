@@ -1,0 +1,146 @@
+//! Where the voxels are, and the way from file coordinates to grid coordinates.
+
+use super::{Params, Size};
+use crate::error::{Error, Fault, Result};
+use crate::numeric::vector::Vec3;
+use crate::spatial::aabb::Aabb;
+use crate::volume::Frame;
+use crate::volume::octree::MAX_DIM;
+
+/// Coordinates nearer to 0 than this many voxels are 0: products of three of them then stay in the
+/// range in which the predicates are exact.
+const SMALLEST: f64 = 1.0 / (1u128 << 100) as f64;
+/// Coordinates may be at most this many voxels (2^300) for the same reason.
+const LARGEST: f64 = 2.037_035_976_334_486e90;
+/// A side that is within this share of a whole number of voxels is that number: the rounding of a
+/// difference and a quotient.
+const WHOLE: f64 = 8.0 * f64::EPSILON;
+
+/// A grid of cubic voxels along the coordinate axes.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Lattice {
+    /// Lower corner of voxel (0, 0, 0), in the mesh's unit.
+    pub lo: Vec3,
+    /// Edge of a voxel, in the mesh's unit.
+    pub h: f64,
+    /// Voxels along x, y, z.
+    pub dims: [usize; 3],
+}
+
+impl Lattice {
+    /// The grid that the parameters ask for around a mesh with these bounds.
+    ///
+    /// With `bounds` it starts at their lower corner and covers them; without, it is centred on the
+    /// mesh and padded. Errs when a side would have more than [`MAX_DIM`] voxels or no size.
+    pub fn fit(mesh: Aabb, params: &Params) -> Result<Self> {
+        let given = params.bounds.map(|b| Aabb {
+            lo: [b[0], b[1], b[2]],
+            hi: [b[3], b[4], b[5]],
+        });
+        let around = given.unwrap_or(if mesh.is_empty() {
+            Aabb {
+                lo: [0.0; 3],
+                hi: [0.0; 3],
+            }
+        } else {
+            mesh
+        });
+        let extent = around.extent();
+        let longest = extent[0].max(extent[1]).max(extent[2]);
+        if !longest.is_finite() {
+            return Err(Error::Geometry(Fault::whole(format!(
+                "the model spans {:?} to {:?}: its extent overflows",
+                around.lo, around.hi
+            ))));
+        }
+        let h = match params.size {
+            Size::VoxelSize(h) => h,
+            // What has no extent gets a voxel of unit size around it.
+            Size::Resolution(_) if longest == 0.0 => 1.0,
+            Size::Resolution(n) => longest / f64::from(n),
+        };
+        if h < f64::MIN_POSITIVE {
+            let problem = format!(
+                "the longest side, {longest}, gives voxels of {h}, below the smallest normal number"
+            );
+            return Err(Error::Geometry(
+                Fault::whole(problem).with_hint("scale the model up"),
+            ));
+        }
+        let pad = if given.is_some() {
+            0.0
+        } else {
+            f64::from(params.pad)
+        };
+        let mut dims = [0; 3];
+        for a in 0..3 {
+            let voxels = match params.size {
+                Size::Resolution(n) if extent[a] == longest && longest > 0.0 => f64::from(n),
+                _ => whole(extent[a] / h),
+            } + 2.0 * pad;
+            if voxels > MAX_DIM as f64 {
+                return Err(Error::Limit {
+                    what: format!("a grid with voxels of {h}"),
+                    needed: format!("{voxels} voxels along {}", ["x", "y", "z"][a]),
+                    limit: format!("{MAX_DIM} voxels"),
+                    hint: Some("lower --resolution, or raise --voxel-size".to_owned()),
+                });
+            }
+            dims[a] = voxels as usize;
+        }
+        let lo = match given {
+            Some(bounds) => bounds.lo,
+            None => {
+                let centre = around.centre();
+                std::array::from_fn(|a| centre[a] - 0.5 * dims[a] as f64 * h)
+            }
+        };
+        Ok(Lattice { lo, h, dims })
+    }
+
+    /// A point in grid coordinates: the difference and the quotient are each rounded once.
+    #[inline]
+    pub fn to_grid(&self, p: Vec3) -> Vec3 {
+        let to = |a: usize| {
+            let q = (p[a] - self.lo[a]) / self.h;
+            if q.abs() < SMALLEST { 0.0 } else { q }
+        };
+        [to(0), to(1), to(2)]
+    }
+
+    /// Checks that no coordinate of a mesh with these bounds is too far from the grid to compute with.
+    pub fn check_reach(&self, mesh: Aabb) -> Result<()> {
+        if mesh.is_empty() {
+            return Ok(());
+        }
+        for (corner, name) in [(mesh.lo, "lower"), (mesh.hi, "upper")] {
+            let q = self.to_grid(corner);
+            if q.iter().any(|c| c.abs() > LARGEST || c.is_nan()) {
+                let problem = format!(
+                    "the {name} corner of the model lies {q:?} voxels from the grid, over 2^300"
+                );
+                return Err(Error::Geometry(
+                    Fault::whole(problem).with_hint("choose --bounds nearer to the model's size"),
+                ));
+            }
+        }
+        Ok(())
+    }
+
+    /// The same grid as the frame of a volume, which names the centre of the first voxel.
+    pub fn frame(&self) -> Frame {
+        let centre = self.lo.map(|c| c + 0.5 * self.h);
+        Frame::straight(self.dims, centre, [self.h; 3])
+    }
+}
+
+/// The number of voxels that cover a side of `voxels`: rounded up, but for a side that is a whole
+/// number up to rounding; at least 1.
+fn whole(voxels: f64) -> f64 {
+    let near = voxels.round();
+    if (voxels - near).abs() <= WHOLE * voxels {
+        near.max(1.0)
+    } else {
+        voxels.ceil().max(1.0)
+    }
+}

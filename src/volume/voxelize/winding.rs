@@ -1,0 +1,379 @@
+//! The winding number of surfaces that are open or wound inconsistently.
+//!
+//! The generalised winding number (Jacobson, Kavan, Sorkine-Hornung 2013) of a point is the solid
+//! angle of the surface over 4 pi. Closing the surface by strips from each border edge to infinity
+//! along +x makes it a whole number, which the signed crossings of the line from the point towards
+//! -x count exactly: that line runs beside the strips and never through one. What is left is the
+//! solid angle of the strips, in closed form per border edge. So the cost follows the length of the
+//! border and not the area of the surface, nothing is approximated by expansions, and only whether
+//! it exceeds a half-integer has to be known: whole boxes of voxels are settled at once by a bound on
+//! its gradient (Biot and Savart's law for the border as a wire), and border edges too far away to
+//! change much within a box are summed once for the box.
+
+use super::kernel::beside;
+use super::lattice::Lattice;
+use crate::mesh::Mesh;
+use crate::mesh::distance::point_segment;
+use crate::mesh::identify::identify;
+use crate::numeric::vector::{Vec3, cross, dot, length, sub};
+use crate::volume::octree::TILE;
+use rayon::prelude::*;
+use std::f64::consts::PI;
+
+/// How much of a winding number all far edges of a box together may be off: a tenth, so that a
+/// point far from the border is settled by them.
+const FAR: f64 = 0.1;
+/// Rounding of one edge's solid angle, generously.
+const ROUNDING: f64 = 1e-12;
+
+/// From voxel `x` on, the centres of a row have this much taken from their crossings.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Step {
+    /// `64 z + y` within the row of tiles.
+    pub row: u32,
+    /// First voxel.
+    pub x: u32,
+    /// The number that the crossings must exceed for the winding number to exceed one half.
+    pub whole: i64,
+}
+
+/// The directed border of a surface: the edges along which its triangles do not cancel.
+#[derive(Debug, Clone, Default)]
+pub struct Border {
+    edges: Vec<Edge>,
+    /// Which triangles are taken the other way round; empty for none.
+    pub reversed: Vec<bool>,
+}
+
+/// A border edge in grid coordinates; it counts `times`-fold.
+#[derive(Debug, Clone, Copy)]
+struct Edge {
+    a: Vec3,
+    b: Vec3,
+    times: f64,
+}
+
+/// A box of voxels, `hi` not included.
+#[derive(Debug, Clone, Copy)]
+struct Block {
+    lo: [u32; 3],
+    hi: [u32; 3],
+}
+
+/// Whether every edge of the mesh is passed as often one way as the other, by position.
+///
+/// A sum over directed edges of a 128-bit hash that changes sign with the direction: it is 0 for a
+/// surface without border, and 0 for another one with a probability of 2^-128.
+pub fn has_no_border(mesh: &Mesh) -> bool {
+    let mix = |mut z: u64| {
+        z = (z ^ (z >> 32)).wrapping_mul(0xd6e8_feb8_6659_fd93);
+        z = (z ^ (z >> 32)).wrapping_mul(0xd6e8_feb8_6659_fd93);
+        z ^ (z >> 32)
+    };
+    let place = |v: u32| {
+        let p = mesh.positions[v as usize].map(|c| (c + 0.0).to_bits());
+        mix(p[0] ^ mix(p[1] ^ mix(p[2])).rotate_left(1))
+    };
+    let sum = mesh
+        .triangles
+        .par_iter()
+        .map(|t| {
+            let h = t.map(place);
+            (0..3).fold(0u128, |sum, i| {
+                let (a, b) = (h[i], h[(i + 1) % 3]);
+                let (low, high) = (a.min(b), a.max(b));
+                let edge = u128::from(mix(low ^ high.rotate_left(17))) << 64
+                    | u128::from(mix(low.wrapping_add(high.rotate_left(41))));
+                match a.cmp(&b) {
+                    std::cmp::Ordering::Less => sum.wrapping_add(edge),
+                    std::cmp::Ordering::Greater => sum.wrapping_sub(edge),
+                    std::cmp::Ordering::Equal => sum,
+                }
+            })
+        })
+        .reduce(|| 0, u128::wrapping_add);
+    sum == 0
+}
+
+impl Border {
+    /// The border of a mesh after its patches are wound consistently; no edges where there is none.
+    ///
+    /// A patch is what hangs together by edges of exactly two triangles. Where it is wound
+    /// consistently as stored it stays so; elsewhere the direction of the larger area wins.
+    /// Cost: O(n log n) for a mesh with a border, one pass for one without.
+    pub fn of(mesh: &Mesh, lattice: &Lattice) -> Self {
+        if has_no_border(mesh) {
+            return Border::default();
+        }
+        let place = identify(&mesh.positions);
+        let mut halves = half_edges(mesh, &place);
+        halves.par_sort_unstable();
+        let reversed = wind(mesh, &halves);
+        let mut edges = Vec::new();
+        for group in halves.chunk_by(|a, b| a.0 == b.0) {
+            let way =
+                |h: &HalfEdge| h.forward() != reversed.get(h.triangle()).copied().unwrap_or(false);
+            let sum: i64 = group.iter().map(|h| if way(h) { 1 } else { -1 }).sum();
+            if sum != 0 {
+                let ends = [group[0].0 >> 32, group[0].0 & 0xffff_ffff];
+                let [a, b] = ends.map(|v| lattice.to_grid(mesh.positions[v as usize]));
+                edges.push(Edge {
+                    a,
+                    b,
+                    times: sum as f64,
+                });
+            }
+        }
+        Border { edges, reversed }
+    }
+
+    /// Number of border edges.
+    pub fn len(&self) -> usize {
+        self.edges.len()
+    }
+
+    /// Number of triangles taken the other way round.
+    pub fn reversed_count(&self) -> u64 {
+        self.reversed.iter().filter(|r| **r).count() as u64
+    }
+
+    /// What the border takes from the crossings of the rows of one row of tiles `[ty, tz]`, by row
+    /// and place; a row starts with 0 taken.
+    pub fn steps(&self, at: [usize; 2], dims: [usize; 3]) -> Vec<Step> {
+        if self.edges.is_empty() {
+            return Vec::new();
+        }
+        let lo = [0, at[0] * TILE, at[1] * TILE];
+        let hi = [
+            dims[0],
+            dims[1].min(lo[1] + TILE),
+            dims[2].min(lo[2] + TILE),
+        ];
+        let block = Block {
+            lo: lo.map(|c| c as u32),
+            hi: hi.map(|c| c as u32),
+        };
+        let near: Vec<u32> = (0..self.edges.len() as u32).collect();
+        let mut steps = Vec::new();
+        let mut stack = vec![(block, near, 0.0, 0.0)];
+        while let Some((block, near, far, slack)) = stack.pop() {
+            match self.settle(&block, &near, far, slack) {
+                Settled::Whole(whole) => {
+                    for z in block.lo[2]..block.hi[2] {
+                        for y in block.lo[1]..block.hi[1] {
+                            let row = (z - lo[2] as u32) * TILE as u32 + (y - lo[1] as u32);
+                            steps.push(Step {
+                                row,
+                                x: block.lo[0],
+                                whole,
+                            });
+                        }
+                    }
+                }
+                Settled::Split(halves, near, far, slack) => {
+                    let [first, second] = halves;
+                    stack.push((first, near.clone(), far, slack));
+                    stack.push((second, near, far, slack));
+                }
+            }
+        }
+        steps.sort_unstable_by_key(|s| (s.row, s.x));
+        // Only changes matter, and a row starts at 0.
+        let mut kept: Vec<Step> = Vec::new();
+        for step in steps {
+            let before = kept
+                .last()
+                .filter(|k| k.row == step.row)
+                .map_or(0, |k| k.whole);
+            if step.whole != before {
+                kept.push(step);
+            }
+        }
+        kept
+    }
+
+    /// Settles a box, or says how to split it.
+    fn settle(&self, block: &Block, near: &[u32], far: f64, slack: f64) -> Settled {
+        let size: [u32; 3] = std::array::from_fn(|a| block.hi[a] - block.lo[a]);
+        let centre: Vec3 =
+            std::array::from_fn(|a| 0.5 * (f64::from(block.lo[a]) + f64::from(block.hi[a])));
+        if size == [1; 3] {
+            // A single centre has all edges summed anew, in their order.
+            let sum: f64 = self.edges.iter().map(|e| e.taken(centre)).sum();
+            return Settled::Whole((sum + 0.5).floor() as i64);
+        }
+        let radius = 0.5 * length(size.map(|s| f64::from(s - 1)));
+        let one_row = size[1] == 1 && size[2] == 1;
+        let share = FAR / self.edges.len() as f64;
+        let (mut far, mut slack) = (far, slack);
+        let (mut sum, mut bound) = (0.0, near.len() as f64 * ROUNDING);
+        let mut crossed = false;
+        let mut rest = Vec::with_capacity(near.len());
+        for index in near {
+            let edge = &self.edges[*index as usize];
+            if !one_row && edge.may_cross(block) {
+                crossed = true;
+                rest.push(*index);
+                continue;
+            }
+            let change = edge.change(centre, radius);
+            let value = edge.taken(centre);
+            if change <= share {
+                far += value;
+                slack += change;
+            } else {
+                sum += value;
+                bound += change;
+                rest.push(*index);
+            }
+        }
+        if !crossed {
+            let (total, open) = (far + sum + 0.5, slack + bound);
+            let (low, high) = ((total - open).floor(), (total + open).floor());
+            if low == high {
+                return Settled::Whole(low as i64);
+            }
+        }
+        // A box that strips run through must get narrower before anything can be said of it.
+        let candidates: &[usize] = if crossed { &[1, 2] } else { &[0, 1, 2] };
+        let axis = candidates
+            .iter()
+            .copied()
+            .max_by_key(|a| (size[*a], 3 - *a))
+            .unwrap_or(0);
+        let middle = block.lo[axis] + size[axis] / 2;
+        let mut halves = [*block; 2];
+        halves[0].hi[axis] = middle;
+        halves[1].lo[axis] = middle;
+        Settled::Split(halves, rest, far, slack)
+    }
+}
+
+/// What came of a box.
+enum Settled {
+    /// All its centres have this number taken.
+    Whole(i64),
+    /// Look at the halves, with these edges; the others are summed, up to a slack.
+    Split([Block; 2], Vec<u32>, f64, f64),
+}
+
+impl Edge {
+    /// The share of the strip from this edge to infinity along +x in the winding number at `p`.
+    fn taken(&self, p: Vec3) -> f64 {
+        let (u, v) = (sub(self.a, p), sub(self.b, p));
+        let (lu, lv) = (length(u), length(v));
+        // The strip is wound against the edge: b, a, infinity.
+        let turn = beside([self.b[1], self.b[2]], [self.a[1], self.a[2]], [p[1], p[2]]);
+        if turn == 0 || lu == 0.0 || lv == 0.0 {
+            return 0.0;
+        }
+        // Van Oosterom and Strackee (1983), with the unit vector of +x as the third corner.
+        // The exact turn gives the sign, also to a volume that is rounding error or 0.
+        let volume = cross(v, u)[0].abs() / (lu * lv);
+        let cosines = 1.0 + dot(u, v) / (lu * lv) + u[0] / lu + v[0] / lv;
+        self.times * volume.copysign(f64::from(turn)).atan2(cosines) / (2.0 * PI)
+    }
+
+    /// A bound on how much [`Edge::taken`] changes within `radius` of `centre`, infinite near the edge.
+    fn change(&self, centre: Vec3, radius: f64) -> f64 {
+        let distance = point_segment(centre, self.a, self.b)
+            .distance_squared
+            .sqrt()
+            - radius;
+        if distance <= 0.0 {
+            return f64::INFINITY;
+        }
+        self.times.abs() * length(sub(self.b, self.a)) * radius / (4.0 * PI * distance * distance)
+    }
+
+    /// Whether the strip may run between the rows of a box.
+    fn may_cross(&self, block: &Block) -> bool {
+        (1..3).all(|a| {
+            let (low, high) = (f64::from(block.lo[a]) + 0.5, f64::from(block.hi[a]) - 0.5);
+            self.a[a].min(self.b[a]) <= high && self.a[a].max(self.b[a]) >= low
+        })
+    }
+}
+
+/// An edge of a triangle: the places of its ends, smaller first; and triangle and direction.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+struct HalfEdge(u64, u64);
+
+impl HalfEdge {
+    fn triangle(&self) -> usize {
+        (self.1 >> 1) as usize
+    }
+
+    fn forward(&self) -> bool {
+        self.1 & 1 == 1
+    }
+}
+
+fn half_edges(mesh: &Mesh, place: &[u32]) -> Vec<HalfEdge> {
+    let of = |(t, corners): (usize, &[u32; 3])| {
+        let at = corners.map(|v| u64::from(place[v as usize]));
+        let edge = move |i: usize| {
+            let (a, b) = (at[i], at[(i + 1) % 3]);
+            (a != b).then(|| {
+                HalfEdge(
+                    a.min(b) << 32 | a.max(b),
+                    (t as u64) << 1 | u64::from(a < b),
+                )
+            })
+        };
+        [edge(0), edge(1), edge(2)].into_iter().flatten()
+    };
+    mesh.triangles
+        .par_iter()
+        .enumerate()
+        .flat_map_iter(of)
+        .collect()
+}
+
+/// Which triangles to reverse so that patches are wound consistently; empty when none.
+fn wind(mesh: &Mesh, halves: &[HalfEdge]) -> Vec<bool> {
+    let pairs = || halves.chunk_by(|a, b| a.0 == b.0).filter(|g| g.len() == 2);
+    if !pairs().any(|g| g[0].forward() == g[1].forward()) {
+        return Vec::new();
+    }
+    // Union of triangles with the parity of the turns between them and their root.
+    let mut parent: Vec<(u32, bool)> = (0..mesh.triangles.len() as u32)
+        .map(|t| (t, false))
+        .collect();
+    for group in pairs() {
+        let (a, b) = (
+            root(&mut parent, group[0].triangle() as u32),
+            root(&mut parent, group[1].triangle() as u32),
+        );
+        if a.0 != b.0 {
+            let turned = a.1 ^ b.1 ^ (group[0].forward() == group[1].forward());
+            parent[a.0.max(b.0) as usize] = (a.0.min(b.0), turned);
+        }
+    }
+    let roots: Vec<(u32, bool)> = (0..parent.len() as u32)
+        .map(|t| root(&mut parent, t))
+        .collect();
+    // Area for and against the root's own direction.
+    let mut areas = vec![[0.0; 2]; roots.len()];
+    for (t, (root, turned)) in roots.iter().enumerate() {
+        let [a, b, c] = mesh.corners(t);
+        areas[*root as usize][usize::from(*turned)] += length(cross(sub(b, a), sub(c, a)));
+    }
+    roots
+        .iter()
+        .map(|(root, turned)| *turned != (areas[*root as usize][1] > areas[*root as usize][0]))
+        .collect()
+}
+
+/// The root of a triangle's patch, and whether the triangle is turned against it; shortens the path.
+fn root(parent: &mut [(u32, bool)], t: u32) -> (u32, bool) {
+    let (mut at, mut turned) = (t, false);
+    while parent[at as usize].0 != at {
+        let (up, turn) = parent[at as usize];
+        let (top, more) = parent[up as usize];
+        parent[at as usize] = (top, turn ^ more);
+        turned ^= turn ^ more;
+        at = top;
+    }
+    (at, turned)
+}
