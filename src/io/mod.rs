@@ -22,6 +22,9 @@ mod text;
 pub mod vdb;
 pub mod vti;
 
+#[cfg(test)]
+mod roundtrip;
+
 use crate::error::{Error, Fault, Result};
 use crate::mesh::{Mesh, Polygons};
 use crate::report::{Input, Output, Warning};
