@@ -23,6 +23,8 @@ pub mod vdb;
 pub mod vti;
 
 #[cfg(test)]
+mod malformed;
+#[cfg(test)]
 mod roundtrip;
 
 use crate::error::{Error, Fault, Result};
@@ -226,7 +228,8 @@ fn dropped(mesh: &Mesh, format: Format) -> Vec<Warning> {
     if !holds.segments {
         note("dropped-segments", "polylines", mesh.segments.len());
     }
-    if !holds.points {
+    // A cloud needs no word of its own where vertices may stand without faces.
+    if !holds.points && !(format == Format::Off && mesh.is_cloud()) {
         note("dropped-points", "points", mesh.points.len());
     }
     if !holds.polygons {
