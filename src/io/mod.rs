@@ -229,7 +229,8 @@ fn dropped(mesh: &Mesh, format: Format) -> Vec<Warning> {
         note("dropped-segments", "polylines", mesh.segments.len());
     }
     // A cloud needs no word of its own where vertices may stand without faces.
-    if !holds.points && !(format == Format::Off && mesh.is_cloud()) {
+    let holds_points = holds.points || (format == Format::Off && mesh.is_cloud());
+    if !holds_points {
         note("dropped-points", "points", mesh.points.len());
     }
     if !holds.polygons {
