@@ -6,7 +6,7 @@ use std::collections::VecDeque;
 
 /// Steps that clipping may take per corner before the rest becomes a fan: it bounds the time that
 /// an outline made for the purpose can take, and is far over what outlines of maps and parts need.
-const STEPS_PER_CORNER: usize = 1024;
+const STEPS_PER_CORNER: usize = 4096;
 /// Corners from which on a grid is worth its making.
 const GRID_FROM: usize = 24;
 

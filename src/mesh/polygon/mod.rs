@@ -51,7 +51,7 @@ impl Polygons {
 /// # Cost
 ///
 /// Linear in the corners for triangles and convex faces; a concave face of n corners takes about
-/// n log n steps where corners are spread evenly, and never more than 1024 n.
+/// n log n steps where corners are spread evenly, and never more than 4096 n.
 pub fn set_faces(
     mesh: &mut Mesh,
     faces: Polygons,
