@@ -1,1 +1,0 @@
-//! Polygons: splitting a face of many corners into triangles.
