@@ -36,7 +36,7 @@ impl Params {
         samples: 100_000,
         seed: 0,
         gap: 1e-4,
-        pieces: 1_000_000,
+        pieces: 200_000,
     };
 
     /// Errors when a value is out of its range.
