@@ -62,6 +62,15 @@ impl Sink {
         format: Format,
         content: impl FnOnce(&mut dyn Write) -> io::Result<()>,
     ) -> Result<Output> {
+        self.write_as(format.name(), content)
+    }
+
+    /// As [`Sink::write`], for what is no geometry (reports, pictures): `name` is its format.
+    pub fn write_as(
+        &self,
+        name: &str,
+        content: impl FnOnce(&mut dyn Write) -> io::Result<()>,
+    ) -> Result<Output> {
         let failed = |source| Error::Write {
             path: self.path().to_owned(),
             source,
@@ -101,7 +110,7 @@ impl Sink {
         };
         Ok(Output {
             path: self.path().display().to_string(),
-            format: format.name().to_owned(),
+            format: name.to_owned(),
             bytes,
             sha256,
         })
