@@ -8,12 +8,14 @@
 pub mod binvox;
 pub mod format;
 pub mod gltf;
+mod header;
 pub mod metaimage;
 pub mod npy;
 pub mod nrrd;
 pub mod obj;
 pub mod off;
 pub mod ply;
+mod samples;
 pub mod sink;
 pub mod source;
 pub mod stl;
