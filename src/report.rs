@@ -180,6 +180,39 @@ impl Warning {
     }
 }
 
+/// How many of something there are, and the first.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Tally {
+    count: u64,
+    first: Option<u64>,
+}
+
+impl Tally {
+    /// Counts the one at `place`; places come in rising order.
+    pub fn note(&mut self, place: u64) {
+        self.count += 1;
+        self.first = self.first.or(Some(place));
+    }
+
+    /// Counts those of a later part.
+    pub fn add(&mut self, later: Tally) {
+        self.count += later.count;
+        self.first = self.first.or(later.first);
+    }
+
+    /// Whether there is none.
+    pub fn is_empty(self) -> bool {
+        self.count == 0
+    }
+
+    /// Adds a warning, unless there is nothing to warn of.
+    pub fn warn(self, code: &str, message: impl Into<String>, warnings: &mut Vec<Warning>) {
+        if self.count > 0 {
+            warnings.push(Warning::new(code, message, self.count, self.first));
+        }
+    }
+}
+
 /// What varies from run to run.
 #[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct Run {

@@ -20,6 +20,7 @@ pub mod sink;
 pub mod source;
 pub mod stl;
 pub mod svo;
+mod text;
 pub mod vdb;
 pub mod vti;
 
