@@ -1,7 +1,10 @@
 //! Meshes: triangles, polylines and points over one list of vertices.
 
+pub mod distance;
+pub mod identify;
 pub mod polygon;
 pub mod shapes;
+pub mod topology;
 
 use crate::error::Fault;
 use crate::numeric::vector::Vec3;

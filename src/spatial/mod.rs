@@ -2,3 +2,4 @@
 
 pub mod aabb;
 pub mod bvh;
+pub mod local;
