@@ -74,7 +74,11 @@ impl Size {
 /// up along the direction gives way to the coordinate axis furthest from it.
 fn axes(direction: Vec3, up: Vec3) -> [Vec3; 3] {
     let back = normalize(direction);
-    let back = if length(back) > 0.5 { back } else { [0.0, 0.0, 1.0] };
+    let back = if length(back) > 0.5 {
+        back
+    } else {
+        [0.0, 0.0, 1.0]
+    };
     let mut right = cross(normalize(up), back);
     if length(right) < 1e-6 {
         let least = (0..3).fold(0, |l, a| if back[a].abs() < back[l].abs() { a } else { l });
@@ -209,9 +213,7 @@ impl Camera {
     fn magnification(&self, size: Size, depth: f64) -> f64 {
         match self.lens {
             Lens::Orthographic { height } => size.height as f64 / height,
-            Lens::Perspective { fov_y } => {
-                size.height as f64 / (2.0 * (fov_y * 0.5).tan() * depth)
-            }
+            Lens::Perspective { fov_y } => size.height as f64 / (2.0 * (fov_y * 0.5).tan() * depth),
         }
     }
 
@@ -302,10 +304,15 @@ mod tests {
 
     #[test]
     fn a_framed_box_fills_the_picture_at_any_size_and_place() {
-        for (offset, size) in [(0.0, 1.0), (0.0, 1e-30), (0.0, 1e30), (1e9, 1.0), (0.0, 1e300)] {
+        for (offset, size) in [
+            (0.0, 1.0),
+            (0.0, 1e-30),
+            (0.0, 1e30),
+            (1e9, 1.0),
+            (0.0, 1e300),
+        ] {
             let bounds = unit_box(offset, size);
-            let camera =
-                Camera::framing(&bounds, THREE_QUARTER, [0.0, 1.0, 0.0], SIZE.aspect());
+            let camera = Camera::framing(&bounds, THREE_QUARTER, [0.0, 1.0, 0.0], SIZE.aspect());
             let mut seen = Aabb::EMPTY;
             for corner in 0..8 {
                 let p = std::array::from_fn(|a| [bounds.lo, bounds.hi][corner >> a & 1][a]);

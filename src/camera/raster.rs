@@ -114,11 +114,12 @@ struct Projector<'a> {
 impl Projector<'_> {
     fn corner(&self, view: Vec3) -> Corner {
         let [x, y, depth] = self.camera.to_screen(view, self.size);
-        let in_front = self.camera.near().is_none_or(|near| depth >= near);
+        // What was cut at the near plane lies on it but for rounding.
+        let in_front = self.camera.near().is_none_or(|near| depth >= near * 0.999);
         let steps = |v: f64| (v * SUBPIXEL).round() as i32;
         // Written so that a place that is not a number is clipped.
-        let place = (in_front && x.abs() <= GUARD && y.abs() <= GUARD)
-            .then(|| [steps(x), steps(y)]);
+        let place =
+            (in_front && x.abs() <= GUARD && y.abs() <= GUARD).then(|| [steps(x), steps(y)]);
         Corner {
             place,
             key: match self.camera.near() {
@@ -179,7 +180,11 @@ impl Scene<'_> {
     fn pieces(&self, id: u32, mut f: impl FnMut(Piece)) {
         let corners = self.triangles[id as usize].map(|v| self.corners[v as usize]);
         if let [Some(a), Some(b), Some(c)] = corners.map(|c| c.place) {
-            f([(a, corners[0].key), (b, corners[1].key), (c, corners[2].key)]);
+            f([
+                (a, corners[0].key),
+                (b, corners[1].key),
+                (c, corners[2].key),
+            ]);
             return;
         }
         let view = self.triangles[id as usize]
@@ -214,7 +219,12 @@ impl Scene<'_> {
                     } else {
                         (*q, *p, at_q, at_p)
                     };
-                    kept.push(lerp(p, q, at_p / (at_p - at_q)));
+                    let mut cut = lerp(p, q, at_p / (at_p - at_q));
+                    if let (0, Some(near)) = (plane, self.lens.camera.near()) {
+                        // Rounding of a far end must not move the cut back behind the eye.
+                        cut[2] = self.lens.camera.distance - near;
+                    }
+                    kept.push(cut);
                 }
             }
             polygon = kept;
@@ -253,7 +263,9 @@ fn pixels_of(piece: &Piece, size: Size) -> Option<[i64; 4]> {
         let [p, q, r] = piece.map(|(place, _)| i64::from(place[a]));
         // Centres lie at 256 i + 128.
         let lo = (p.min(q).min(r) + 127).div_euclid(256).max(0);
-        let hi = (p.max(q).max(r) - 128).div_euclid(256).min(count as i64 - 1);
+        let hi = (p.max(q).max(r) - 128)
+            .div_euclid(256)
+            .min(count as i64 - 1);
         (lo <= hi).then_some((lo, hi))
     };
     let (x0, x1) = range(0, size.width)?;
@@ -336,7 +348,11 @@ impl Band<'_> {
             return;
         }
         // Edge i is opposite corner i, so that its share of the area is the corner's weight.
-        let edges = [Edge::new(b.0, c.0), Edge::new(c.0, a.0), Edge::new(a.0, b.0)];
+        let edges = [
+            Edge::new(b.0, c.0),
+            Edge::new(c.0, a.0),
+            Edge::new(a.0, b.0),
+        ];
         let slope = [(a.1 - c.1) / area as f64, (b.1 - c.1) / area as f64];
         for y in y0.max(self.first as i64)..=y1 {
             let values = edges.map(|e| e.at(0, y));
@@ -362,5 +378,190 @@ impl Band<'_> {
                 }
             }
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::camera::{Lens, THREE_QUARTER};
+    use crate::numeric::rng::Rng;
+    use crate::spatial::aabb::Aabb;
+
+    /// One unit of view space is one pixel; x right, y up from the middle.
+    fn flat(size: Size) -> Camera {
+        Camera {
+            target: [0.0; 3],
+            unit: 1.0,
+            axes: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
+            distance: 8.0,
+            lens: Lens::Orthographic {
+                height: size.height as f64,
+            },
+        }
+    }
+
+    #[test]
+    fn a_fan_around_a_pixel_centre_covers_every_pixel_once() {
+        let size = Size {
+            width: 41,
+            height: 33,
+        };
+        for seed in 0..20 {
+            let mut rng = Rng::new(seed, 0);
+            // The hub lies on a pixel centre, and so do some of the rim: ties in every direction.
+            let rim = 12;
+            let mut positions = vec![[0.0, 0.0, 0.0]];
+            for i in 0..rim {
+                let angle = f64::from(i) / f64::from(rim) * std::f64::consts::TAU;
+                let radius = 40.0 + rng.range(0.0, 9.0).round();
+                positions.push([
+                    (radius * angle.cos()).round(),
+                    (radius * angle.sin()).round(),
+                    0.0,
+                ]);
+            }
+            let mut count = vec![0; size.width * size.height];
+            for i in 0..rim as u32 {
+                let triangle = [[0, 1 + i, 1 + (i + 1) % rim as u32]];
+                let one = rasterize(&flat(size), size, &positions, &triangle);
+                for (n, t) in count.iter_mut().zip(&one.triangle) {
+                    *n += i32::from(*t != NOTHING);
+                }
+            }
+            assert!(count.iter().all(|n| *n == 1), "{seed}");
+        }
+    }
+
+    #[test]
+    fn pixels_are_those_whose_centre_is_inside() {
+        use crate::numeric::predicates::orient2d;
+        let size = Size {
+            width: 37,
+            height: 29,
+        };
+        for seed in 0..300 {
+            let mut rng = Rng::new(7, seed);
+            // Places are multiples of 1/256, which rounding leaves alone; some far outside.
+            let spread = if seed % 3 == 0 { 3000.0 } else { 30.0 };
+            let mut place = || (rng.range(-spread, spread) * 256.0).round() / 256.0;
+            let positions: Vec<Vec3> = (0..3).map(|_| [place(), place(), 0.0]).collect();
+            let drawn = rasterize(&flat(size), size, &positions, &[[0, 1, 2]]);
+            let [a, b, c] = [0, 1, 2].map(|i: usize| [positions[i][0], positions[i][1]]);
+            for y in 0..size.height {
+                for x in 0..size.width {
+                    let p = [x as f64 + 0.5 - 18.5, 14.5 - y as f64 - 0.5];
+                    let turns = [orient2d(a, b, p), orient2d(b, c, p), orient2d(c, a, p)];
+                    let inside = turns == [1; 3] || turns == [-1; 3];
+                    let found = drawn.triangle[y * size.width + x] == 0;
+                    assert!(found == inside || turns.contains(&0), "{seed}: {x} {y}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn the_nearer_triangle_wins_and_of_equals_the_first() {
+        let size = Size {
+            width: 16,
+            height: 16,
+        };
+        let square = |z: f64| [[-9.0, -9.0, z], [30.0, -9.0, z], [-9.0, 30.0, z]];
+        let positions = [square(0.0), square(1.0), square(1.0)].concat();
+        let triangles = [[0, 1, 2], [3, 4, 5], [6, 7, 8]];
+        let drawn = rasterize(&flat(size), size, &positions, &triangles);
+        assert!(drawn.triangle.iter().all(|t| *t == 1));
+        assert!(drawn.depth.iter().all(|d| *d == 7.0));
+    }
+
+    #[test]
+    fn depth_is_that_of_the_plane_under_either_lens() {
+        let size = Size {
+            width: 64,
+            height: 48,
+        };
+        let positions = [[-3.0, -2.0, 0.5], [3.0, -2.0, -1.0], [0.0, 3.0, 0.2]];
+        let plane = |p: Vec3| {
+            let [a, b, c] = positions;
+            let n = crate::numeric::vector::cross(
+                crate::numeric::vector::sub(b, a),
+                crate::numeric::vector::sub(c, a),
+            );
+            crate::numeric::vector::dot(n, crate::numeric::vector::sub(p, a))
+        };
+        let bounds = Aabb::around(&positions);
+        let up = [0.0, 1.0, 0.0];
+        for camera in [
+            Camera::framing(&bounds, THREE_QUARTER, up, size.aspect()),
+            Camera::look_at([1.0, 2.0, 5.0], [0.0; 3], up, 0.8),
+        ] {
+            let drawn = rasterize(&camera, size, &positions, &[[0, 1, 2]]);
+            let mut shown = 0;
+            for (at, depth) in drawn.depth.iter().enumerate() {
+                if drawn.triangle[at] == 0 {
+                    shown += 1;
+                    let (x, y) = (at % size.width, at / size.width);
+                    let view =
+                        camera.from_screen(x as f64 + 0.5, y as f64 + 0.5, f64::from(*depth), size);
+                    let turned = camera.turn_back(view);
+                    let world: Vec3 =
+                        std::array::from_fn(|a| camera.target[a] + turned[a] * camera.unit);
+                    // Rounding vertices to 1/256 pixel moves the plane by about as much.
+                    assert!(plane(world).abs() < 0.2, "{}", plane(world));
+                }
+            }
+            assert!(shown > 300, "{shown}");
+        }
+    }
+
+    #[test]
+    fn a_floor_that_passes_under_the_eye_reaches_the_horizon() {
+        let size = Size {
+            width: 40,
+            height: 40,
+        };
+        let far = 1e7;
+        let positions = [
+            [-far, 0.0, -far],
+            [far, 0.0, -far],
+            [far, 0.0, far],
+            [-far, 0.0, far],
+        ];
+        let triangles = [[0, 2, 1], [0, 3, 2]];
+        let camera = Camera::look_at([0.0, 1.0, 0.0], [0.0, 1.0, -1.0], [0.0, 1.0, 0.0], 1.2);
+        let drawn = rasterize(&camera, size, &positions, &triangles);
+        for y in 0..40 {
+            for x in 0..40 {
+                let shown = drawn.triangle[y * 40 + x] != NOTHING;
+                assert_eq!(shown, y >= 20, "{x} {y}");
+            }
+        }
+    }
+
+    #[test]
+    fn threads_and_size_change_nothing() {
+        let size = Size {
+            width: 120,
+            height: 90,
+        };
+        let mut rng = Rng::new(11, 0);
+        let mut place = || [0; 3].map(|_| rng.range(-1.0, 1.0));
+        let soup: Vec<Vec3> = (0..300).map(|_| place()).collect();
+        let triangles: Vec<[u32; 3]> = (0..100).map(|t| [3 * t, 3 * t + 1, 3 * t + 2]).collect();
+        let draw = |factor: f64, threads| {
+            let positions: Vec<Vec3> = soup.iter().map(|p| p.map(|c| c * factor)).collect();
+            let bounds = Aabb::around(&positions);
+            let camera = Camera::framing(&bounds, THREE_QUARTER, [0.0, 1.0, 0.0], size.aspect());
+            let pool = rayon::ThreadPoolBuilder::new()
+                .num_threads(threads)
+                .build()
+                .expect("a pool");
+            pool.install(|| rasterize(&camera, size, &positions, &triangles))
+        };
+        let base = draw(1.0, 1);
+        assert!(base.triangle.iter().filter(|t| **t != NOTHING).count() > 2000);
+        assert_eq!(base, draw(1.0, 4));
+        assert_eq!(base, draw(2f64.powi(-100), 3));
+        assert_eq!(base, draw(2f64.powi(100), 2));
     }
 }

@@ -163,7 +163,10 @@ fn nearest_in(palette: &[Srgb], colour: Srgb) -> u8 {
 fn mean(colours: impl Iterator<Item = (Srgb, u32)>) -> Srgb {
     let (sum, count) = colours.fold(([0u64; 3], 0u64), |(sum, count), (c, n)| {
         let n = u64::from(n);
-        (std::array::from_fn(|a| sum[a] + u64::from(c[a]) * n), count + n)
+        (
+            std::array::from_fn(|a| sum[a] + u64::from(c[a]) * n),
+            count + n,
+        )
     });
     let count = count.max(1);
     sum.map(|s| ((s + count / 2) / count) as u8)
@@ -200,7 +203,11 @@ impl Span {
         Span {
             from,
             to,
-            error: if to - from > 1 { spread.iter().sum() } else { 0.0 },
+            error: if to - from > 1 {
+                spread.iter().sum()
+            } else {
+                0.0
+            },
             channel,
             mean: sum[channel] / count,
         }
@@ -225,7 +232,11 @@ mod tests {
         for y in 10..80 {
             for x in 20..280 {
                 let level = ((x * 37 + y * y) % 251) as u8;
-                let colour = if y < 40 { [level; 3] } else { [level / 2, level / 3, level] };
+                let colour = if y < 40 {
+                    [level; 3]
+                } else {
+                    [level / 2, level / 3, level]
+                };
                 picture.blend(x as isize, y as isize, colour, 1.0);
             }
         }
@@ -255,7 +266,11 @@ mod tests {
         let picture = ramps();
         let (pixels, _) = decode(&encode_within(&picture, README_LIMIT));
         let wanted = picture.pixels().concat();
-        let worst = pixels.iter().zip(&wanted).map(|(a, b)| a.abs_diff(*b)).max();
+        let worst = pixels
+            .iter()
+            .zip(&wanted)
+            .map(|(a, b)| a.abs_diff(*b))
+            .max();
         assert!(worst <= Some(4), "{worst:?}");
     }
 

@@ -124,9 +124,7 @@ impl Picture {
     /// Fills the rectangle between two corners given in pixels, with smooth edges where a corner
     /// falls inside a pixel.
     pub fn fill(&mut self, from: [f64; 2], to: [f64; 2], colour: Srgb) {
-        let cover = |at: isize, lo: f64, hi: f64| {
-            ((at + 1) as f64).min(hi) - (at as f64).max(lo)
-        };
+        let cover = |at: isize, lo: f64, hi: f64| ((at + 1) as f64).min(hi) - (at as f64).max(lo);
         let end = |v: f64, size: usize| v.ceil().clamp(0.0, size as f64) as isize;
         let start = |v: f64| v.floor().max(0.0) as isize;
         for y in start(from[1])..end(to[1], self.height) {

@@ -45,14 +45,7 @@ pub fn shortened(text: &str, cap: f64, room: f64) -> String {
 /// Writes a text with its baseline at height `at[1]`, hung at `at[0]`, in pixels from the top left.
 ///
 /// Letters are smooth: a pixel takes as much ink as the stroke covers of a disc in it.
-pub fn draw(
-    picture: &mut Picture,
-    text: &str,
-    at: [f64; 2],
-    cap: f64,
-    align: Align,
-    colour: Srgb,
-) {
+pub fn draw(picture: &mut Picture, text: &str, at: [f64; 2], cap: f64, align: Align, colour: Srgb) {
     let unit = cap / CAP;
     let mut x = match align {
         Align::Left => at[0],
@@ -186,7 +179,14 @@ mod tests {
     fn no_two_letters_look_alike() {
         let look = |c: char| {
             let mut picture = Picture::new(24, 24, WHITE);
-            draw(&mut picture, &c.to_string(), [4.0, 18.0], 12.0, Align::Left, INK);
+            draw(
+                &mut picture,
+                &c.to_string(),
+                [4.0, 18.0],
+                12.0,
+                Align::Left,
+                INK,
+            );
             picture
         };
         let letters: Vec<char> = (' '..='~').collect();
@@ -200,7 +200,14 @@ mod tests {
     #[test]
     fn text_stays_where_it_was_hung() {
         let mut picture = Picture::new(200, 30, WHITE);
-        draw(&mut picture, "right", [190.0, 20.0], 10.0, Align::Right, INK);
+        draw(
+            &mut picture,
+            "right",
+            [190.0, 20.0],
+            10.0,
+            Align::Right,
+            INK,
+        );
         let wide = width("right", 10.0);
         for y in 0..30 {
             for x in 0..200 {
@@ -208,7 +215,14 @@ mod tests {
                 assert!(inside || picture.get(x, y) == WHITE, "{x} {y}");
             }
         }
-        draw(&mut picture, "far outside", [-1e9, 1e9], 10.0, Align::Left, INK);
+        draw(
+            &mut picture,
+            "far outside",
+            [-1e9, 1e9],
+            10.0,
+            Align::Left,
+            INK,
+        );
     }
 
     #[test]
