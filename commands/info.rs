@@ -7,6 +7,7 @@ use crate::shared::{Common, Inputs};
 use crate::words;
 use scantle::error::Result;
 use scantle::io::Content;
+use scantle::mesh::topology::{Topology, topology};
 use scantle::volume::Volume;
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -38,7 +39,7 @@ pub struct Params {}
 #[serde(tag = "kind", rename_all = "kebab-case")]
 pub enum Stats {
     /// Triangles, polylines, points.
-    Mesh {},
+    Mesh(Topology),
     /// Voxels.
     Volume(VolumeStats),
 }
@@ -73,14 +74,19 @@ pub fn run(args: &Args) -> Result<Exit> {
 
 fn look(job: &mut Job) -> Result<Found<Params, Stats>> {
     let content = job.read()?;
-    job.progress().stage("look", 0);
     let mut summary = job
         .input()
         .map(|input| words::content(&input.content))
         .unwrap_or_default();
     let stats = match content {
-        Content::Mesh(_) => Stats::Mesh {},
+        Content::Mesh(mesh) => {
+            let topology = topology(&mesh, job.progress())?;
+            job.warn(topology.warnings());
+            summary += if topology.closed { ", closed" } else { "" };
+            Stats::Mesh(topology)
+        }
         Content::Volume(volume) => {
+            job.progress().stage("count", 0);
             let stats = volume_stats(&volume);
             summary += &format!(", {} set", stats.set);
             Stats::Volume(stats)
