@@ -1,6 +1,7 @@
 //! What the readers of text formats share: lines, words, numbers.
 
 use crate::error::Fault;
+use std::io::{self, Write};
 
 /// Lines with their numbers, counted from 1; their ends (LF, CRLF, or CR alone in a text without
 /// any LF) are taken off.
@@ -247,7 +248,6 @@ pub fn triple<'a>(
 
 /// Appends the shortest decimal that reads back as the same number.
 pub fn push_number(text: &mut Vec<u8>, value: f64) {
-    use std::io::Write;
     let size = value.abs();
     // Writing into a vector does not fail.
     let _ = if size == 0.0 || (1e-5..1e16).contains(&size) {
@@ -255,6 +255,16 @@ pub fn push_number(text: &mut Vec<u8>, value: f64) {
     } else {
         write!(text, "{value:e}")
     };
+}
+
+/// Hands on what was gathered, once it is worth a call.
+pub fn spill(text: &mut Vec<u8>, out: &mut dyn Write) -> io::Result<()> {
+    const ENOUGH: usize = 1 << 16;
+    if text.len() >= ENOUGH {
+        out.write_all(text)?;
+        text.clear();
+    }
+    Ok(())
 }
 
 #[cfg(test)]

@@ -98,7 +98,16 @@ impl Mesh {
         self.triangles.is_empty() && self.segments.is_empty() && self.points.is_empty()
     }
 
-    /// What every reader promises: finite coordinates, indices in range, attributes of one length.
+    /// Whether it is a cloud: points alone, which are all the vertices in their order.
+    pub fn is_cloud(&self) -> bool {
+        self.face_count() == 0
+            && self.segments.is_empty()
+            && self.points.len() == self.positions.len()
+            && self.points.iter().zip(0u32..).all(|(p, v)| *p == v)
+    }
+
+    /// What every reader promises: finite coordinates, normals and colours, indices in range,
+    /// attributes of one length.
     pub fn check(&self) -> Result<(), Fault> {
         let bad = self
             .positions
@@ -165,6 +174,28 @@ impl Mesh {
                     "{length} {what} for {count} vertices"
                 )));
             }
+        }
+        self.check_attributes()
+    }
+
+    fn check_attributes(&self) -> Result<(), Fault> {
+        let normals = self.normals.as_deref().unwrap_or_default();
+        let bad = normals
+            .par_iter()
+            .position_first(|n| !n.iter().all(|c| c.is_finite()));
+        if let Some(v) = bad {
+            let [x, y, z] = normals[v];
+            let problem = format!("normal ({x}, {y}, {z}) is not finite");
+            return Err(Fault::element("vertex", v, problem));
+        }
+        let colors = self.colors.as_deref().unwrap_or_default();
+        let bad = colors
+            .par_iter()
+            .position_first(|n| !n.iter().all(|c| c.is_finite()));
+        if let Some(v) = bad {
+            let [r, g, b, a] = colors[v];
+            let problem = format!("colour ({r}, {g}, {b}, {a}) is not finite");
+            return Err(Fault::element("vertex", v, problem));
         }
         Ok(())
     }
