@@ -39,8 +39,7 @@ pub fn count_faces(volume: &Volume) -> u64 {
 /// The faces between set voxels and what is not set, as a mesh of squares.
 ///
 /// Each face is one quad of `polygons` and two of `triangles` (2 f and 2 f + 1 for face f), counter-
-/// clockwise from outside; quads begin at their corner of lowest lattice place but for the +x, +y
-/// and +z sides, which begin there too. Voxel (i, j, k) reaches from half a step below to half a
+/// clockwise from outside, and begins at its corner of lowest lattice place. Voxel (i, j, k) reaches from half a step below to half a
 /// step above its centre. Faces follow the voxels, x fastest, and within a voxel the sides -x, +x,
 /// -y, +y, -z, +z. Vertices are the lattice corners that faces use, each once, x fastest: voxels
 /// that touch along an edge only share its two vertices. The same on any number of threads.
