@@ -210,7 +210,7 @@ impl Camera {
 
     /// Pixels per unit across the viewing axis, at a depth.
     #[inline]
-    fn magnification(&self, size: Size, depth: f64) -> f64 {
+    pub fn magnification(&self, size: Size, depth: f64) -> f64 {
         match self.lens {
             Lens::Orthographic { height } => size.height as f64 / height,
             Lens::Perspective { fov_y } => size.height as f64 / (2.0 * (fov_y * 0.5).tan() * depth),
@@ -254,6 +254,13 @@ impl Camera {
             Lens::Orthographic { .. } => [0.0, 0.0, 1.0],
             Lens::Perspective { .. } => normalize(sub([0.0, 0.0, self.distance], p)),
         }
+    }
+
+    /// The view space of this camera seen from another's: a turn (rows) and a shift, in this one's
+    /// unit. Both cameras have one unit.
+    pub fn from_other(&self, other: &Camera) -> ([Vec3; 3], Vec3) {
+        let turn = self.axes.map(|own| other.axes.map(|axis| dot(own, axis)));
+        (turn, self.to_view(other.target))
     }
 
     /// The same camera looking from elsewhere at the same target, with the same unit and parallel rays.
