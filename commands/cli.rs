@@ -50,12 +50,14 @@ Exit codes:
 
 /// The whole command line, for parsing, completions and manual pages.
 pub fn command() -> clap::Command {
-    let mut command =
+    let command =
         Cli::command().mut_subcommand("convert", |c| c.mut_arg("output", |arg| arg.required(true)));
-    command.build();
+    // Building adds the command `help`, which the list shows too.
+    let mut built = command.clone();
+    built.build();
     let template = format!(
         "{{about-with-newline}}\n{{usage-heading}} {{usage}}\n\n{}Options:\n{{options}}{{after-help}}",
-        grouped(&command)
+        grouped(&built)
     );
     command.help_template(template)
 }
@@ -112,7 +114,8 @@ mod tests {
 
     #[test]
     fn every_command_is_in_one_group_of_the_help() {
-        let command = command();
+        let mut command = command();
+        command.build();
         let mut listed: Vec<&str> = GROUPS.iter().flat_map(|(_, names)| *names).copied().collect();
         let mut there: Vec<&str> = command
             .get_subcommands()

@@ -29,7 +29,7 @@ pub struct Args {
 const EXAMPLES: &str = "\
 Examples:
   scantle convert fixtures/shapes/cube.obj -o cube.ply
-  scantle convert fixtures/shapes/*.obj -o out/{stem}.stl
+  scantle convert fixtures/shapes/*.obj -o {stem}.stl
 ";
 
 /// What was asked for.

@@ -1,16 +1,20 @@
 //! Files that are not what they should be are refused with words, and nothing else happens.
 //!
 //! Beside each file of `fixtures/malformed/` stands `FILE.expected`: the message as it follows the
-//! file's name, and on a second line the way out, where there is one.
+//! file's name, and on a second line the way out, where there is one. `UPDATE_GOLDEN=1` rewrites it.
 
-use crate::support::{Workplace, files_below, root};
+use crate::support::{Workplace, files_below, root, updating};
 use std::fs;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
-fn expected_of(file: &Path) -> String {
+fn expected_beside(file: &Path) -> PathBuf {
     let mut name = file.file_name().expect("a name").to_owned();
     name.push(".expected");
-    let expected = file.with_file_name(name);
+    file.with_file_name(name)
+}
+
+fn expected_of(file: &Path) -> String {
+    let expected = expected_beside(file);
     fs::read_to_string(&expected).unwrap_or_else(|e| panic!("{}: {e}", expected.display()))
 }
 
@@ -34,6 +38,11 @@ fn malformed_files_are_refused_with_words() {
         let name = file.strip_prefix(root()).expect("a fixture").display().to_string();
         let place = Workplace::new();
         let ran = place.run(&format!("info {name}"));
+        if updating("UPDATE_GOLDEN") {
+            let said = ran.stderr.replace(&format!("scantle: {name}:"), "");
+            let lines: Vec<&str> = said.lines().map(str::trim_start).collect();
+            fs::write(expected_beside(&file), lines.join("\n") + "\n").expect("a fixture");
+        }
         let expected = messages(&name, &expected_of(&file));
         if ran.code != 3 || !ran.stdout.is_empty() || !expected.contains(&ran.stderr) {
             wrong.push(format!("{name} ends with {}:\n{}", ran.code, ran.stderr));
