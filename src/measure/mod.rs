@@ -1,1 +1,8 @@
 //! Judging results: errors between two things of one kind.
+
+mod hausdorff;
+pub mod mesh_distance;
+mod surface;
+#[cfg(test)]
+mod test_shapes;
+pub mod volume_difference;
