@@ -263,7 +263,7 @@ impl Format {
                 segments: true,
                 points: true,
                 normals: false,
-                colors: false,
+                colors: true,
             },
             Format::Ply => Holds {
                 polygons: true,

@@ -24,6 +24,11 @@ mod text;
 pub mod vdb;
 pub mod vti;
 
+#[cfg(test)]
+mod malformed;
+#[cfg(test)]
+mod roundtrip;
+
 use crate::error::{Error, Fault, Result};
 use crate::mesh::{Mesh, Polygons};
 use crate::report::{Input, Output, Warning};
@@ -225,7 +230,9 @@ fn dropped(mesh: &Mesh, format: Format) -> Vec<Warning> {
     if !holds.segments {
         note("dropped-segments", "polylines", mesh.segments.len());
     }
-    if !holds.points {
+    // A cloud needs no word of its own where vertices may stand without faces.
+    let holds_points = holds.points || (format == Format::Off && mesh.is_cloud());
+    if !holds_points {
         note("dropped-points", "points", mesh.points.len());
     }
     if !holds.polygons {

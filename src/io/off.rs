@@ -348,3 +348,120 @@ fn write_face(text: &mut Vec<u8>, face: &[u32], out: &mut dyn Write) -> io::Resu
     text.push(b'\n');
     spill(text, out)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::io::roundtrip::{self, Content};
+    use proptest::prelude::*;
+
+    fn read_text(text: &str) -> Result<(Mesh, Vec<Warning>), Fault> {
+        let source = Source::from_bytes("test.off", text.into()).unwrap();
+        let mut warnings = Vec::new();
+        read(&source, &mut warnings).map(|mesh| (mesh, warnings))
+    }
+
+    fn message(text: &str) -> String {
+        read_text(text).unwrap_err().to_string()
+    }
+
+    #[test]
+    fn keywords_are_told() {
+        for word in [
+            "OFF",
+            "COFF",
+            "NOFF",
+            "CNOFF",
+            "STCNOFF",
+            "4OFF",
+            "STCN4nOFF",
+        ] {
+            assert!(has_keyword(format!("{word} 3 1 0\n").as_bytes()), "{word}");
+        }
+        for word in ["", "off", "NCOFF", "OFFICE", "XOFF"] {
+            assert!(!has_keyword(word.as_bytes()), "{word}");
+        }
+    }
+
+    #[test]
+    fn counts_stand_on_either_line_or_alone() {
+        let body = "0 0 0\n1 0 0\n\n# half way\n0 1 0 # last\n3 0 1 2\n";
+        for head in ["OFF\n3 1 3\n", "OFF 3 1\n", "# made by hand\n\n3 1 0\n"] {
+            let (mesh, warnings) = read_text(&format!("{head}{body}")).unwrap();
+            assert_eq!(
+                (mesh.positions.len(), &mesh.triangles[..]),
+                (3, &[[0, 1, 2]][..])
+            );
+            assert!(warnings.is_empty());
+        }
+    }
+
+    #[test]
+    fn variants_have_colours_normals_and_texture_coordinates() {
+        let (mesh, warnings) = read_text(
+            "STCNOFF\n3 1 0\n0 0 0 0 0 1 255 0 51 255 .5 .5\n1 0 0 0 0 1 0 0 0 .5 .5\n\
+             0 1 0 0 0 1 255 255 255 .5 .5\n3 0 1 2 255 0 0\n",
+        )
+        .unwrap();
+        assert_eq!(mesh.normals.unwrap(), [[0.0, 0.0, 1.0]; 3]);
+        let colors = [[1.0, 0.0, 0.2, 1.0], [0.0, 0.0, 0.0, 1.0], [1.0; 4]];
+        assert_eq!(mesh.colors.unwrap(), colors);
+        let codes: Vec<_> = warnings.iter().map(|w| (&*w.code, w.count)).collect();
+        let expected = [
+            ("ignored-texture-coordinates", 3),
+            ("ignored-face-colours", 1),
+        ];
+        assert_eq!(codes, expected);
+        let (mesh, _) = read_text("COFF 1 0 0\n1 2 3 0.5 1 0 0.25\n").unwrap();
+        assert_eq!(mesh.colors.unwrap(), [[0.5, 1.0, 0.0, 0.25]]);
+        assert_eq!(mesh.points, [0]);
+    }
+
+    #[test]
+    fn faults_name_the_line_and_the_numbers() {
+        assert_eq!(
+            message("OFF 3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 3\n"),
+            "5: face refers to vertex 3, but there are 3"
+        );
+        assert_eq!(
+            message("OFF 3 1 0\n0 0 0\n1 0 0\n"),
+            "3: the file ends after 2 of 3 vertices"
+        );
+        assert_eq!(
+            message("OFF 1152921504606846976 1 0\n0 0 0\n"),
+            "2: the file ends after 1 of 1152921504606846976 vertices"
+        );
+        assert_eq!(
+            message("OFF 1 1 0\n0 0 0\n4000000000 0 0\n"),
+            "3: face has 2 corners of 4000000000"
+        );
+        assert_eq!(message("OFF BINARY\n"), "1: binary OFF is not read");
+        assert_eq!(
+            message("4OFF 1 0 0\n"),
+            "1: 4OFF holds points of more than three dimensions"
+        );
+        assert_eq!(
+            message("hello\n"),
+            "1: expected the keyword OFF or the counts, found \"hello\""
+        );
+        assert_eq!(message("OFF -1 0 0\n"), "1: \"-1\" is no count of vertices");
+    }
+
+    proptest! {
+        #[test]
+        fn what_was_written_reads_back(mesh in roundtrip::mesh(Content {
+            normals: false, segments: false, points: false, ..Content::ALL
+        })) {
+            let mut bytes = Vec::new();
+            write(&mesh, &mut bytes).unwrap();
+            let (back, warnings) = read_text(&String::from_utf8(bytes).unwrap()).unwrap();
+            prop_assert!(roundtrip::only_about_faces(&warnings), "{:?}", warnings);
+            prop_assert_eq!(back, mesh);
+        }
+
+        #[test]
+        fn no_text_makes_it_panic(text in "(ST)?C?N?(OFF)?\n?( ?[0-9]{0,2}){0,3}\n((-?[0-9.e]{0,4} ){0,8}\n){0,8}") {
+            let _ = read_text(&text);
+        }
+    }
+}

@@ -109,7 +109,7 @@ impl Reader<'_> {
                 let [a, b] = last;
                 match length {
                     0 | 1 => {}
-                    _ if length % 2 == 0 => self.faces.push(&[a, b, vertex]),
+                    _ if length.is_multiple_of(2) => self.faces.push(&[a, b, vertex]),
                     _ => self.faces.push(&[b, a, vertex]),
                 }
                 last = [b, vertex];

@@ -190,3 +190,275 @@ impl<'h> Reader<'h> {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::io::roundtrip::{self, Content};
+    use proptest::prelude::*;
+
+    fn read_bytes(bytes: &[u8]) -> Result<(Mesh, Vec<Warning>), Fault> {
+        let source = Source::from_bytes("test.ply", bytes.to_vec()).unwrap();
+        let mut warnings = Vec::new();
+        read(&source, &mut warnings).map(|mesh| (mesh, warnings))
+    }
+
+    fn message(bytes: &[u8]) -> String {
+        read_bytes(bytes).unwrap_err().to_string()
+    }
+
+    /// One small mesh with lists among its vertex and face properties, in any encoding.
+    fn rich(format: &str) -> Vec<u8> {
+        let mut bytes = format!(
+            "ply\nformat {format} 1.0\ncomment one of everything\nobj_info none\n\
+             element camera 2\nproperty list ushort double view\nproperty char id\n\
+             element vertex 4\nproperty uchar red\nproperty uchar green\nproperty uchar blue\n\
+             property list uchar short history\nproperty double x\nproperty int y\nproperty short z\n\
+             element nothing 1152921504606846976\n\
+             element face 2\nproperty float quality\nproperty list ushort uchar vertex_index\n\
+             property uchar flag\n\
+             element tristrips 1\nproperty list int int vertex_indices\n\
+             element edge 1\nproperty uint vertex1\nproperty uchar vertex2\nproperty float weight\n\
+             end_header\n"
+        )
+        .into_bytes();
+        let rows: &[&[(&str, f64)]] = &[
+            &[("u16", 2.0), ("f64", 0.1), ("f64", -7.0), ("i8", -1.0)],
+            &[("u16", 0.0), ("i8", 3.0)],
+            &[
+                ("u8", 255.0),
+                ("u8", 0.0),
+                ("u8", 51.0),
+                ("u8", 0.0),
+                ("f64", 0.1),
+                ("i32", 0.0),
+                ("i16", 0.0),
+            ],
+            &[
+                ("u8", 0.0),
+                ("u8", 0.0),
+                ("u8", 0.0),
+                ("u8", 1.0),
+                ("i16", -300.0),
+                ("f64", 1.0),
+                ("i32", 0.0),
+                ("i16", 0.0),
+            ],
+            &[
+                ("u8", 0.0),
+                ("u8", 0.0),
+                ("u8", 0.0),
+                ("u8", 0.0),
+                ("f64", 1.0),
+                ("i32", 70000.0),
+                ("i16", 0.0),
+            ],
+            &[
+                ("u8", 0.0),
+                ("u8", 0.0),
+                ("u8", 0.0),
+                ("u8", 0.0),
+                ("f64", 0.0),
+                ("i32", 1.0),
+                ("i16", -2.0),
+            ],
+            &[
+                ("f32", 0.5),
+                ("u16", 3.0),
+                ("u8", 0.0),
+                ("u8", 1.0),
+                ("u8", 2.0),
+                ("u8", 9.0),
+            ],
+            &[
+                ("f32", 0.5),
+                ("u16", 4.0),
+                ("u8", 0.0),
+                ("u8", 1.0),
+                ("u8", 2.0),
+                ("u8", 3.0),
+                ("u8", 9.0),
+            ],
+            &[
+                ("i32", 8.0),
+                ("i32", 0.0),
+                ("i32", 1.0),
+                ("i32", 2.0),
+                ("i32", 3.0),
+                ("i32", -1.0),
+                ("i32", 3.0),
+                ("i32", 2.0),
+                ("i32", 1.0),
+            ],
+            &[("u32", 3.0), ("u8", 1.0), ("f32", 1.5)],
+        ];
+        let big = format == "binary_big_endian";
+        for row in rows {
+            for (kind, value) in *row {
+                macro_rules! put {
+                    ($type:ty) => {{
+                        let value = *value as $type;
+                        bytes.extend_from_slice(&if big {
+                            value.to_be_bytes()
+                        } else {
+                            value.to_le_bytes()
+                        });
+                    }};
+                }
+                match (format, *kind) {
+                    ("ascii", _) => bytes.extend_from_slice(format!("{value} ").as_bytes()),
+                    (_, "i8") => put!(i8),
+                    (_, "u8") => put!(u8),
+                    (_, "i16") => put!(i16),
+                    (_, "u16") => put!(u16),
+                    (_, "i32") => put!(i32),
+                    (_, "u32") => put!(u32),
+                    (_, "f32") => put!(f32),
+                    _ => put!(f64),
+                }
+            }
+            if format == "ascii" {
+                bytes.extend_from_slice(b"\n");
+            }
+        }
+        bytes
+    }
+
+    #[test]
+    fn every_encoding_holds_the_same() {
+        let (mesh, warnings) = read_bytes(&rich("ascii")).unwrap();
+        assert_eq!(mesh.positions[2], [1.0, 70000.0, 0.0]);
+        assert_eq!(mesh.colors.as_ref().unwrap()[0], [1.0, 0.0, 0.2, 1.0]);
+        let faces: Vec<_> = mesh.polygons.as_ref().unwrap().iter().collect();
+        let expected: [&[u32]; 5] = [
+            &[0, 1, 2],
+            &[0, 1, 2, 3],
+            &[0, 1, 2],
+            &[2, 1, 3],
+            &[3, 2, 1],
+        ];
+        assert_eq!(faces, expected);
+        assert_eq!(mesh.segments, [[3, 1]]);
+        assert!(mesh.points.is_empty());
+        assert_eq!(
+            warnings[0].message,
+            "properties that are not read: camera.view, camera.id, vertex.history, face.quality, \
+             face.flag, edge.weight"
+        );
+        for format in ["binary_little_endian", "binary_big_endian"] {
+            assert_eq!(
+                read_bytes(&rich(format)).unwrap(),
+                (mesh.clone(), warnings.clone())
+            );
+        }
+    }
+
+    #[test]
+    fn a_file_cut_anywhere_is_refused_and_says_how_much_is_there() {
+        for format in ["binary_little_endian", "binary_big_endian"] {
+            let bytes = rich(format);
+            for length in 0..bytes.len() {
+                assert!(read_bytes(&bytes[..length]).is_err(), "{length}");
+            }
+            let end = bytes.len() - 1;
+            let expected = format!("byte {end}: the file ends after 0 of 1 edges");
+            assert_eq!(message(&bytes[..end]), expected);
+        }
+    }
+
+    #[test]
+    fn blocks_and_rows_give_the_same() {
+        let mut mesh = Mesh {
+            positions: (0..30_000)
+                .map(|i| [f64::from(i), f64::from(i % 13), 0.5])
+                .collect(),
+            triangles: (0..29_998).map(|i| [i, i + 1, i + 2]).collect(),
+            ..Mesh::default()
+        };
+        let written = |mesh: &Mesh| {
+            let mut bytes = Vec::new();
+            write(mesh, &mut bytes).unwrap();
+            bytes
+        };
+        assert_eq!(read_bytes(&written(&mesh)).unwrap().0, mesh);
+        // One index out of range sends all of it to the rows, which name the face.
+        mesh.triangles[20_000][1] = 30_000;
+        let expected = "face 20000: refers to vertex 30000, but there are 30000";
+        assert_eq!(message(&written(&mesh)), expected);
+        mesh.triangles[20_000][1] = u32::MAX;
+        let expected = "face 20000: refers to vertex -1, but there are 30000";
+        assert_eq!(message(&written(&mesh)), expected);
+    }
+
+    #[test]
+    fn headers_that_claim_too_much_are_refused() {
+        let header = |format: &str, count: u64| {
+            format!(
+                "ply\nformat {format} 1.0\nelement vertex {count}\nproperty float x\nproperty float y\nproperty float z\nend_header\n"
+            )
+        };
+        let many = 1 << 60;
+        let text = header("ascii", many) + "0 0 0\n";
+        let expected = "8: the file ends after 1 of 1152921504606846976 vertices";
+        assert_eq!(message(text.as_bytes()), expected);
+        let text = header("binary_little_endian", many) + "0123456789ab0123";
+        let expected = format!(
+            "byte {}: the file ends after 1 of 1152921504606846976 vertices",
+            text.len()
+        );
+        assert_eq!(message(text.as_bytes()), expected);
+    }
+
+    #[test]
+    fn lines_of_the_header_end_in_every_usual_way() {
+        let text = "ply\nformat binary_little_endian 1.0\nelement vertex 1\nproperty uchar x\nproperty uchar y\nproperty uchar z\nend_header\n";
+        for end in ["\n", "\r\n", "\r"] {
+            let mut bytes = text.replace('\n', end).into_bytes();
+            bytes.extend_from_slice(b"\n\r\n");
+            let (mesh, warnings) = read_bytes(&bytes).unwrap();
+            assert_eq!(mesh.positions, [[10.0, 13.0, 10.0]]);
+            assert_eq!(mesh.points, [0]);
+            assert!(warnings.is_empty());
+        }
+    }
+
+    #[test]
+    fn faces_of_many_corners_are_written() {
+        let ring = (0..300).map(|i| f64::from(i) / 300.0 * std::f64::consts::TAU);
+        let mut mesh = Mesh {
+            positions: ring.map(|a| [a.cos(), a.sin(), 0.0]).collect(),
+            ..Mesh::default()
+        };
+        let mut faces = Polygons::default();
+        faces.push(&(0..300).collect::<Vec<_>>());
+        set_faces(&mut mesh, faces, &mut Vec::new()).unwrap();
+        let mut bytes = Vec::new();
+        write(&mesh, &mut bytes).unwrap();
+        assert_eq!(read_bytes(&bytes).unwrap().0, mesh);
+    }
+
+    proptest! {
+        #[test]
+        fn what_was_written_reads_back(mesh in roundtrip::mesh(Content::ALL)) {
+            let mut bytes = Vec::new();
+            write(&mesh, &mut bytes).unwrap();
+            let (back, warnings) = read_bytes(&bytes).unwrap();
+            prop_assert!(roundtrip::only_about_faces(&warnings), "{:?}", warnings);
+            prop_assert_eq!(back, mesh);
+        }
+
+        #[test]
+        fn no_bytes_make_it_panic(
+            format in "ascii|binary_little_endian|binary_big_endian",
+            at in 0..900usize,
+            change in prop::collection::vec(any::<u8>(), 1..4),
+        ) {
+            let mut bytes = rich(&format);
+            let at = at % bytes.len();
+            for (old, new) in bytes[at..].iter_mut().zip(change) {
+                *old = new;
+            }
+            let _ = read_bytes(&bytes);
+        }
+    }
+}

@@ -1,0 +1,124 @@
+//! Meshes made at random, for the tests that read back what they wrote.
+
+use crate::mesh::polygon::set_faces;
+use crate::mesh::{Mesh, Polygons};
+use crate::report::Warning;
+use proptest::prelude::*;
+
+/// What the meshes may have beside vertices and faces.
+#[derive(Debug, Clone, Copy)]
+pub struct Content {
+    pub normals: bool,
+    pub colors: bool,
+    pub segments: bool,
+    pub points: bool,
+}
+
+impl Content {
+    pub const ALL: Content = Content {
+        normals: true,
+        colors: true,
+        segments: true,
+        points: true,
+    };
+}
+
+/// Any finite number, half of them exactly 32-bit ones.
+fn number() -> impl Strategy<Value = f64> {
+    prop_oneof![
+        any::<f32>()
+            .prop_filter("finite", |c| c.is_finite())
+            .prop_map(f64::from),
+        any::<f64>().prop_filter("finite", |c| c.is_finite()),
+        -100.0..100.0f64,
+        Just(-0.0),
+    ]
+}
+
+/// Positions of which, in half of the meshes, all are 32-bit numbers.
+fn positions() -> impl Strategy<Value = Vec<[f64; 3]>> {
+    let wide = prop::collection::vec(prop::array::uniform3(number()), 1..30);
+    (wide, any::<bool>()).prop_map(|(mut positions, narrow)| {
+        if narrow {
+            for c in positions.as_flattened_mut() {
+                *c = f64::from(c.clamp(-3e38, 3e38) as f32);
+            }
+        }
+        positions
+    })
+}
+
+fn colors(count: usize) -> impl Strategy<Value = Vec<[f32; 4]>> {
+    let byte = any::<u8>().prop_map(|b| (f64::from(b) / 255.0) as f32);
+    let bytes = prop::collection::vec(prop::array::uniform4(byte), count);
+    let reals = prop::collection::vec(prop::array::uniform4(0.0..=1.0f32), count);
+    let opaque = |colors: Vec<[f32; 4]>| colors.iter().map(|c| [c[0], c[1], c[2], 1.0]).collect();
+    prop_oneof![
+        bytes.clone(),
+        reals.clone(),
+        bytes.prop_map(opaque),
+        reals.prop_map(opaque)
+    ]
+}
+
+/// A mesh as a reader gives it: triangles or faces of up to seven corners, or a cloud.
+pub fn mesh(content: Content) -> impl Strategy<Value = Mesh> {
+    positions().prop_flat_map(move |positions| {
+        let n = positions.len();
+        let vertex = 0..n as u32;
+        let face = prop_oneof![
+            prop::collection::vec(vertex.clone(), 3),
+            prop::collection::vec(vertex.clone(), 3..8)
+        ];
+        let triangle = prop::collection::vec(vertex.clone(), 3);
+        let faces = prop_oneof![
+            prop::collection::vec(face, 0..20),
+            prop::collection::vec(triangle, 0..20)
+        ];
+        let up_to = |most: usize, has: bool| 0..=if has { most } else { 0 };
+        let segments = prop::collection::vec(
+            prop::array::uniform2(vertex.clone()),
+            up_to(9, content.segments),
+        );
+        let points = prop::collection::vec(vertex, up_to(9, content.points));
+        let normals = prop::collection::vec(prop::array::uniform3(-1.0..1.0f64), n);
+        let attributes = (
+            prop::option::of(normals).prop_map(move |n| n.filter(|_| content.normals)),
+            prop::option::of(colors(n)).prop_map(move |c| c.filter(|_| content.colors)),
+        );
+        (Just(positions), faces, segments, points, attributes)
+            .prop_map(|(p, f, s, o, a)| assembled(p, &f, s, o, a))
+    })
+}
+
+type Attributes = (Option<Vec<[f64; 3]>>, Option<Vec<[f32; 4]>>);
+
+fn assembled(
+    positions: Vec<[f64; 3]>,
+    faces: &[Vec<u32>],
+    segments: Vec<[u32; 2]>,
+    points: Vec<u32>,
+    (normals, colors): Attributes,
+) -> Mesh {
+    let mut mesh = Mesh {
+        positions,
+        segments,
+        points,
+        normals,
+        colors,
+        ..Mesh::default()
+    };
+    let mut polygons = Polygons::default();
+    faces.iter().for_each(|face| polygons.push(face));
+    set_faces(&mut mesh, polygons, &mut Vec::new()).unwrap();
+    if mesh.is_empty() {
+        mesh.points = (0..mesh.positions.len() as u32).collect();
+    }
+    mesh.check().unwrap();
+    mesh
+}
+
+/// Faces made at random cross themselves; nothing else is to be warned of.
+pub fn only_about_faces(warnings: &[Warning]) -> bool {
+    warnings.iter().all(|w| w.code == "fanned-faces")
+}
