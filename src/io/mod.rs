@@ -9,6 +9,8 @@ pub mod binvox;
 pub mod format;
 pub mod gltf;
 mod header;
+#[cfg(test)]
+mod malformed;
 pub mod metaimage;
 pub mod npy;
 pub mod nrrd;
