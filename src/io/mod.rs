@@ -16,6 +16,8 @@ pub mod npy;
 pub mod nrrd;
 pub mod obj;
 pub mod off;
+#[cfg(test)]
+mod peers;
 pub mod ply;
 mod samples;
 pub mod sink;
