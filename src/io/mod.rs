@@ -3,7 +3,7 @@
 //! Readers keep what a file holds, in its order, and never repair. They refuse what a header
 //! claims but the bytes do not hold before they make room for it. A gzip layer is taken off
 //! whatever the file is called. Nothing outside the named file is read, but for the data file
-//! that a glTF, OBJ or MetaImage header names in the same folder or below.
+//! that a glTF, OBJ, NRRD or MetaImage header names in the same folder or below.
 
 pub mod binvox;
 pub mod format;

@@ -219,6 +219,11 @@ impl<'a> Reader<'a> {
     ) -> Result<Vec<T>, Fault> {
         let size = layout.bytes();
         let Some(view) = accessor.buffer_view else {
+            if accessor.sparse.is_none() {
+                // Zeros by the letter; in files that exist, the data is in an extension.
+                let problem = "has no data: neither a bufferView nor sparse values";
+                return Err(Fault::element("accessor", index, problem));
+            }
             let most = BARE_ELEMENTS.max(self.buffers.file_bytes());
             if accessor.count > most {
                 return Err(Fault::element(
@@ -246,7 +251,7 @@ impl<'a> Reader<'a> {
             accessor.count,
         )?;
         let step = stride.map_or(size, |s| usize::try_from(s).unwrap_or(usize::MAX));
-        Ok(bytes.chunks(step).map(|bytes| element(bytes)).collect())
+        Ok(bytes.chunks(step).map(element).collect())
     }
 
     /// The elements that sparse values replace, in increasing order.

@@ -37,6 +37,7 @@ pub fn assemble(
 #[derive(Default)]
 struct Counts {
     skins: u64,
+    instances: u64,
     targets: u64,
     placeless: u64,
     normals: u64,
@@ -51,6 +52,11 @@ impl Counts {
                 "ignored-skins",
                 "nodes with a skin; their meshes are taken as stored, not posed by joints",
                 self.skins,
+            ),
+            (
+                "ignored-instancing",
+                "nodes with EXT_mesh_gpu_instancing; their meshes are placed once",
+                self.instances,
             ),
             (
                 "ignored-morph-targets",
@@ -115,6 +121,7 @@ impl<'a> Assembly<'a> {
         let (mut total, mut normals, mut colors) = (0, 0, 0);
         for place in placed {
             self.counts.skins += u64::from(place.skinned);
+            self.counts.instances += u64::from(place.instanced);
             for primitive in self.primitives(place)? {
                 if !primitive.attributes.contains_key("POSITION") {
                     self.counts.placeless += 1;

@@ -14,6 +14,8 @@ pub struct Placed {
     pub mesh: usize,
     /// Whether the node has a skin too.
     pub skinned: bool,
+    /// Whether an extension makes several instances of it.
+    pub instanced: bool,
     /// From the mesh's coordinates to the scene's.
     pub transform: Matrix4<f64>,
 }
@@ -91,6 +93,7 @@ pub fn placed(document: &Document) -> Result<Vec<Placed>, Fault> {
                 node: index,
                 mesh,
                 skinned: node.skin.is_some(),
+                instanced: node.extensions.contains_key("EXT_mesh_gpu_instancing"),
                 transform,
             });
         }

@@ -106,7 +106,7 @@ fn normals_turn_by_the_inverse_transpose() {
 
 #[test]
 fn primitives_that_share_accessors_share_vertices_and_attributes_some_lack_are_dropped() {
-    let rest = "\"nodes\":[{\"mesh\":0,\"skin\":0}],\
+    let rest = "\"nodes\":[{\"mesh\":0,\"skin\":0,\"extensions\":{\"EXT_mesh_gpu_instancing\":{}}}],\
         \"meshes\":[{\"primitives\":[{\"attributes\":{\"POSITION\":0},\"mode\":0,\"targets\":[{\"POSITION\":0}]},\
           {\"attributes\":{\"POSITION\":0,\"NORMAL\":0,\"COLOR_0\":0},\"mode\":3},{\"attributes\":{}}]}]";
     let (mesh, warnings) = parse(&zigzag(rest)).unwrap();
@@ -116,6 +116,7 @@ fn primitives_that_share_accessors_share_vertices_and_attributes_some_lack_are_d
     let codes: Vec<_> = warnings.iter().map(|w| w.code.as_str()).collect();
     let wanted = [
         "ignored-skins",
+        "ignored-instancing",
         "ignored-morph-targets",
         "primitives-without-positions",
         "dropped-normals",
