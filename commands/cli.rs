@@ -2,7 +2,7 @@
 
 use crate::exit::Exit;
 use crate::streams::say;
-use crate::{completions, convert, formats, info, man, schema};
+use crate::{compare, completions, convert, formats, info, man, schema};
 use clap::error::ErrorKind;
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 use std::fmt::Write;
@@ -22,6 +22,7 @@ struct Cli {
 #[derive(Debug, Subcommand)]
 pub enum Command {
     Info(info::Args),
+    Compare(compare::Args),
     Convert(convert::Args),
     Formats(formats::Args),
     Schema(schema::Args),
@@ -31,7 +32,7 @@ pub enum Command {
 
 /// The commands by what goes in and what comes out, as the help shows them.
 const GROUPS: &[(&str, &[&str])] = &[
-    ("Any file", &["info", "convert"]),
+    ("Any file", &["info", "convert", "compare"]),
     (
         "About scantle",
         &["formats", "schema", "completions", "help"],

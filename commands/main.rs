@@ -14,6 +14,7 @@ mod shared;
 mod streams;
 mod words;
 
+mod compare;
 mod completions;
 mod convert;
 mod formats;
@@ -31,6 +32,7 @@ fn main() -> ExitCode {
     };
     let ended = match &command {
         Command::Info(args) => info::run(args),
+        Command::Compare(args) => compare::run(args),
         Command::Convert(args) => convert::run(args),
         Command::Formats(args) => formats::run(args),
         Command::Schema(args) => schema::run(args),

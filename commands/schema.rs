@@ -2,7 +2,7 @@
 
 use crate::exit::Exit;
 use crate::streams::print;
-use crate::{convert, formats, info, words};
+use crate::{compare, convert, formats, info, words};
 use clap::builder::PossibleValuesParser;
 use scantle::error::Result;
 use scantle::report::Report;
@@ -29,6 +29,7 @@ type Row = (&'static str, fn() -> Schema);
 
 /// The schema of every command that prints JSON.
 const SCHEMAS: &[Row] = &[
+    ("compare", || schema_for!(compare::Report)),
     ("convert", || schema_for!(convert::Report)),
     ("formats", || schema_for!(formats::Table)),
     ("info", || schema_for!(info::Report)),

@@ -9,7 +9,7 @@ use crate::error::Fault;
 use crate::io::source::Source;
 use crate::report::Warning;
 use crate::volume::bits::BitGrid;
-use crate::volume::octree::{Cell, Octree};
+use crate::volume::octree::Cell;
 use crate::volume::{Data, Frame, Volume};
 use std::io::{self, Write};
 
@@ -222,7 +222,7 @@ pub fn write(volume: &Volume, out: &mut dyn Write) -> io::Result<()> {
     for x0 in (0..nx).step_by(PLANES) {
         planes.clear();
         match &volume.data {
-            Data::Sparse(tree) => planes_of_tree(tree, x0, &mut planes),
+            Data::Sparse(tree) => tree.visit(&mut |cell| set_cell(cell, x0, &mut planes)),
             _ => planes_of_slabs(volume, x0, &mut planes),
         }
         for x in 0..PLANES.min(nx - x0) {
@@ -277,9 +277,9 @@ fn transpose(block: &mut [u64; 64]) {
     }
 }
 
-/// The same planes of a sparse grid.
-fn planes_of_tree(tree: &Octree, x0: usize, planes: &mut BitGrid) {
-    tree.visit(&mut |cell| match cell {
+/// Sets the voxels of a cell of an octree that lie in the planes from `x0` on.
+fn set_cell(cell: Cell, x0: usize, planes: &mut BitGrid) {
+    match cell {
         Cell::Full { min, edge } => {
             let from = min[0].max(x0);
             for x in from..(min[0] + edge).min(x0 + PLANES) {
@@ -301,7 +301,7 @@ fn planes_of_tree(tree: &Octree, x0: usize, planes: &mut BitGrid) {
             }
         }
         Cell::Brick { .. } => {}
-    });
+    }
 }
 
 /// Codes runs of equal bits as pairs of value and count.
@@ -438,6 +438,39 @@ mod tests {
             .collect();
         assert_eq!(set, [[1, 0, 0], [0, 1, 0], [1, 1, 0]]);
         assert_eq!(written(&volume), bytes);
+    }
+
+    #[test]
+    fn cells_set_the_same_planes_as_slices() {
+        let brick = 0x8000_0000_0400_0201;
+        let volume = cube(144, |p| {
+            let full = (0..3).all(|a| (64..128).contains(&p[a]));
+            let b = [
+                p[0].wrapping_sub(60),
+                p[1].wrapping_sub(8),
+                p[2].wrapping_sub(140),
+            ];
+            full || (b.iter().all(|c| *c < 4) && brick >> (b[0] + 4 * b[1] + 16 * b[2]) & 1 == 1)
+        });
+        let cells = [
+            Cell::Brick {
+                min: [60, 8, 140],
+                bits: brick,
+            },
+            Cell::Full {
+                min: [64; 3],
+                edge: 64,
+            },
+        ];
+        for x0 in [0, 64, 128] {
+            let mut wanted = BitGrid::new([144, 144, PLANES]);
+            planes_of_slabs(&volume, x0, &mut wanted);
+            let mut found = BitGrid::new([144, 144, PLANES]);
+            for cell in cells {
+                set_cell(cell, x0, &mut found);
+            }
+            assert!(found == wanted);
+        }
     }
 
     #[test]

@@ -66,7 +66,7 @@ impl Header {
     fn parse(bytes: &[u8]) -> Result<Header, Fault> {
         let mut tags = BTreeMap::new();
         let mut lines = Lines::new(bytes);
-        while let Some((line, text)) = lines.next() {
+        for (line, text) in &mut lines {
             if text.trim().is_empty() {
                 continue;
             }

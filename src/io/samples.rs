@@ -37,6 +37,7 @@ pub enum ByteOrder {
 
 impl SampleType {
     /// All types.
+    #[cfg(test)]
     pub const ALL: [SampleType; 10] = [
         SampleType::U8,
         SampleType::I8,

@@ -115,10 +115,10 @@ fn spaced(header: &Header, sizes: &[u64], first: usize) -> Result<(Vec3, [Vec3; 
             origin[to] = mins[axis] + if cells[axis] { 0.5 * step } else { 0.0 };
         }
     }
-    if let (None, Some(field)) = (header.get("axismins"), header.get("spaceorigin")) {
-        if let [Some(placed)] = vectors(field)?.as_slice() {
-            origin = *placed;
-        }
+    if let (None, Some(field)) = (header.get("axismins"), header.get("spaceorigin"))
+        && let [Some(placed)] = vectors(field)?.as_slice()
+    {
+        origin = *placed;
     }
     Ok((origin, axes))
 }

@@ -299,8 +299,8 @@ impl Extent {
     fn leaf(&mut self, at: [usize; 3], leaf: &Leaf) {
         self.count += count(leaf);
         let any = leaf.iter().fold(0, |a, b| a | b);
-        for i in 0..8 {
-            if leaf[i] != 0 {
+        for (i, word) in leaf.iter().enumerate() {
+            if *word != 0 {
                 self.span(0, at[0] + i, at[0] + i);
             }
             if any >> (8 * i) & 0xff != 0 {
