@@ -3,17 +3,23 @@
 //! Readers keep what a file holds, in its order, and never repair. They refuse what a header
 //! claims but the bytes do not hold before they make room for it. A gzip layer is taken off
 //! whatever the file is called. Nothing outside the named file is read, but for the data file
-//! that a glTF, OBJ or MetaImage header names in the same folder or below.
+//! that a glTF, OBJ, NRRD or MetaImage header names in the same folder or below.
 
 pub mod binvox;
 pub mod format;
 pub mod gltf;
+mod header;
+#[cfg(test)]
+mod malformed;
 pub mod metaimage;
 pub mod npy;
 pub mod nrrd;
 pub mod obj;
 pub mod off;
+#[cfg(test)]
+mod peers;
 pub mod ply;
+mod samples;
 pub mod sink;
 pub mod source;
 pub mod stl;

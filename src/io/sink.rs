@@ -62,6 +62,15 @@ impl Sink {
         format: Format,
         content: impl FnOnce(&mut dyn Write) -> io::Result<()>,
     ) -> Result<Output> {
+        self.write_as(format.name(), content)
+    }
+
+    /// As [`Sink::write`], for what is no geometry (reports, pictures): `name` is its format.
+    pub fn write_as(
+        &self,
+        name: &str,
+        content: impl FnOnce(&mut dyn Write) -> io::Result<()>,
+    ) -> Result<Output> {
         let failed = |source| Error::Write {
             path: self.path().to_owned(),
             source,
@@ -87,7 +96,7 @@ impl Sink {
                     .prefix(".scantle-")
                     .permissions_of_new_files()
                     .tempfile_in(folder)
-                    .map_err(failed)?;
+                    .map_err(|e| failed(without_path(&e)))?;
                 let (file, figures) = fill(file, self.is_gzip(), content).map_err(failed)?;
                 if let Ok(old) = fs::metadata(path) {
                     file.as_file()
@@ -101,11 +110,18 @@ impl Sink {
         };
         Ok(Output {
             path: self.path().display().to_string(),
-            format: format.name().to_owned(),
+            format: name.to_owned(),
             bytes,
             sha256,
         })
     }
+}
+
+/// An error of a temporary file, without the name of that file: the user never gave it.
+fn without_path(error: &io::Error) -> io::Error {
+    let text = error.to_string();
+    let said = text.split(" at path ").next().unwrap_or_default();
+    io::Error::new(error.kind(), said)
 }
 
 /// New files get the permissions that the user's umask gives, not the private ones of temporary files.

@@ -124,7 +124,10 @@ impl Source {
         self.limit
     }
 
-    /// The bytes of a file that this one names, in the same folder or below, unpacked.
+    /// The bytes of a file that this one names, in the same folder or below, as stored.
+    ///
+    /// No gzip layer is taken off: the header says how the data is packed, and raw samples may
+    /// begin with any bytes.
     ///
     /// A name that is absolute or leads out of the folder is refused, as is any name in an input
     /// that has no folder.
@@ -145,11 +148,9 @@ impl Source {
             )));
         }
         let path = self.path.parent().unwrap_or(Path::new("")).join(relative);
-        let source =
-            open_bytes(&path, self.limit).and_then(|bytes| Source::new(path, bytes, self.limit));
-        let source =
-            source.map_err(|e| Fault::whole(format!("names the data file {name:?}: {e}")))?;
-        Ok(source.bytes().to_vec())
+        let bytes = open_bytes(&path, self.limit)
+            .map_err(|e| Fault::whole(format!("names the data file {name:?}: {e}")))?;
+        Ok(bytes.get().to_vec())
     }
 }
 

@@ -240,6 +240,22 @@ impl Volume {
         })
     }
 
+    /// The smallest and the largest value, those that are no number left aside; `None` where there
+    /// is no number.
+    pub fn range(&self) -> Option<[f64; 2]> {
+        if self.frame.is_empty() {
+            return None;
+        }
+        let [lo, hi] = with_samples!(&self.data, v => v
+            .iter()
+            .map(|sample| *sample as f64)
+            .fold([f64::INFINITY, f64::NEG_INFINITY], |[lo, hi], s| [lo.min(s), hi.max(s)]), _ => {
+            let set = self.count_set();
+            [set == self.frame.len() as u64, set > 0].map(|bit| f64::from(u8::from(bit)))
+        });
+        (lo <= hi).then_some([lo, hi])
+    }
+
     /// Dimensions, type and the outer bounds of the voxels, for a report.
     pub fn content(&self) -> Content {
         let mut bounds = crate::spatial::aabb::Aabb::EMPTY;

@@ -1,0 +1,128 @@
+//! `scantle compare`: how far two results of one kind are from each other.
+
+use crate::context::{Context, Files};
+use crate::exit::Exit;
+use crate::job::{Found, Job};
+use crate::shared::{Common, InputFormat, Seed, not_negative};
+use scantle::error::Result;
+use scantle::io::Content;
+use scantle::measure::mesh_distance::{self, MeshDifference};
+use scantle::measure::volume_difference::{self, VolumeDifference};
+use scantle::mesh::Mesh;
+use scantle::report::Measures;
+use scantle::volume::Volume;
+use schemars::JsonSchema;
+use serde::Serialize;
+
+/// Measure how far two meshes, or two volumes, are from each other
+///
+/// Meshes: the Hausdorff distance with a proven bound, mean and root mean square distances, area
+/// and volume. Volumes of the same dimensions: the voxels that differ, and by how much.
+#[derive(Debug, clap::Args)]
+#[command(after_long_help = EXAMPLES)]
+pub struct Args {
+    /// The two files; `-` for standard input
+    #[arg(value_names = ["A", "B"], num_args = 2, required = true)]
+    inputs: Vec<String>,
+    #[command(flatten)]
+    format: InputFormat,
+    /// Exit with 1 when they differ by more than X: for meshes the Hausdorff distance in the file's
+    /// unit, for volumes the number of voxels that differ
+    #[arg(long, value_name = "X", value_parser = not_negative)]
+    tolerance: Option<f64>,
+    /// Points spread over each mesh for mean and root mean square
+    #[arg(long, value_name = "N", default_value_t = mesh_distance::Params::DEFAULT.samples)]
+    samples: u64,
+    #[command(flatten)]
+    seed: Seed,
+    #[command(flatten)]
+    common: Common,
+}
+
+const EXAMPLES: &str = "\
+Examples:
+  scantle compare fixtures/shapes/cube.obj fixtures/shapes/cube.ply --tolerance 0
+  scantle compare fixtures/shapes/torus.obj fixtures/shapes/sphere.stl
+";
+
+/// What was asked for.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct Params {
+    /// The largest difference allowed, null without a check.
+    tolerance: Option<f64>,
+    /// How meshes were compared.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    mesh: Option<mesh_distance::Params>,
+    /// How volumes were compared.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    volume: Option<volume_difference::Params>,
+}
+
+/// How they differ.
+#[derive(Debug, Serialize, JsonSchema)]
+#[serde(tag = "kind", rename_all = "kebab-case")]
+pub enum Stats {
+    /// Two meshes.
+    Mesh(MeshDifference),
+    /// Two volumes.
+    Volume(VolumeDifference),
+}
+
+/// The report of this command.
+pub type Report = scantle::report::Report<Params, Stats>;
+
+/// Compares the two.
+pub fn run(args: &Args) -> Result<Exit> {
+    let context = Context::new(&args.common)?;
+    let params = mesh_distance::Params {
+        samples: args.samples,
+        seed: args.seed.seed,
+        ..mesh_distance::Params::DEFAULT
+    };
+    params.check()?;
+    let files = Files::together(&args.inputs, &args.format);
+    context.run("compare", &files, |job| {
+        let found = match job.read()? {
+            Content::Mesh(a) => meshes(job, &a, params, args.tolerance),
+            Content::Volume(a) => volumes(job, &a, args.tolerance),
+        };
+        Ok(found?.check("tolerance", args.tolerance))
+    })
+}
+
+fn meshes(
+    job: &mut Job,
+    a: &Mesh,
+    params: mesh_distance::Params,
+    tolerance: Option<f64>,
+) -> Result<Found<Params, Stats>> {
+    let b = job.read_mesh()?;
+    let difference = mesh_distance::compare(a, &b, &params, job.progress())?;
+    let params = Params {
+        tolerance,
+        mesh: Some(params),
+        volume: None,
+    };
+    let summary = format!(
+        "hausdorff distance {} (at most {}), rms {}",
+        difference.hausdorff, difference.hausdorff_bound, difference.rms
+    );
+    let accuracy = Measures::One(difference.accuracy());
+    Ok(Found::new(params, Stats::Mesh(difference), summary).accuracy(accuracy))
+}
+
+fn volumes(job: &mut Job, a: &Volume, tolerance: Option<f64>) -> Result<Found<Params, Stats>> {
+    let b = job.read_volume()?;
+    let params = volume_difference::Params::DEFAULT;
+    let difference = volume_difference::compare(a, &b, &params, job.progress())?;
+    job.warn(difference.warnings());
+    let params = Params {
+        tolerance,
+        mesh: None,
+        volume: Some(params),
+    };
+    let (differing, voxels) = (difference.differing, difference.voxels);
+    let summary = format!("{differing} of {voxels} voxels differ");
+    let accuracy = Measures::One(difference.accuracy());
+    Ok(Found::new(params, Stats::Volume(difference), summary).accuracy(accuracy))
+}

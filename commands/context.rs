@@ -1,0 +1,253 @@
+//! What a command works in: threads, memory, and the reports of its jobs.
+
+use crate::destination::{self, Destination};
+use crate::exit::Exit;
+use crate::job::{Found, Job};
+use crate::machine::{self, Moment};
+use crate::progress;
+use crate::shared::{Common, InputFormat, Inputs, Output, Preview};
+use crate::streams::{complain, print};
+use rayon::{ThreadPool, ThreadPoolBuilder};
+use scantle::error::{Error, Result};
+use scantle::io::format::Format;
+use scantle::io::sink::Sink;
+use serde::Serialize;
+use std::cell::Cell;
+use std::slice;
+
+/// Threads, memory limit and clock of one run.
+pub struct Context<'a> {
+    common: &'a Common,
+    pool: ThreadPool,
+    memory: u64,
+    start: Moment,
+}
+
+/// The files of a run, as the command line names them.
+pub struct Files<'a> {
+    inputs: &'a [String],
+    format: Option<Format>,
+    together: bool,
+    output: Option<&'a Output>,
+    preview: Option<&'a Preview>,
+}
+
+impl<'a> Files<'a> {
+    /// Inputs that are worked on one after the other, with a report for each.
+    pub fn each(inputs: &'a Inputs) -> Self {
+        Files {
+            together: false,
+            ..Files::together(&inputs.inputs, &inputs.format)
+        }
+    }
+
+    /// Inputs that belong together, with one report.
+    pub fn together(inputs: &'a [String], format: &InputFormat) -> Self {
+        Files {
+            inputs,
+            format: format.input_format,
+            together: true,
+            output: None,
+            preview: None,
+        }
+    }
+
+    /// With a result that is written where the user says.
+    pub fn output(mut self, output: &'a Output) -> Self {
+        self.output = Some(output);
+        self
+    }
+
+    /// With a picture, where the user wants one.
+    pub fn preview(mut self, preview: &'a Preview) -> Self {
+        self.preview = Some(preview);
+        self
+    }
+
+    /// The inputs of each job.
+    fn jobs(&self) -> Vec<&'a [String]> {
+        if self.together {
+            vec![self.inputs]
+        } else {
+            self.inputs.iter().map(slice::from_ref).collect()
+        }
+    }
+
+    /// The name of each job: its first input.
+    fn names(&self) -> Vec<String> {
+        self.jobs().iter().map(|job| job[0].clone()).collect()
+    }
+
+    fn plan_outputs(&self) -> Result<Option<Vec<(Destination, Format)>>> {
+        let Some((word, asked)) = self
+            .output
+            .and_then(|o| Some((o.output.as_deref()?, o.output_format)))
+        else {
+            return Ok(None);
+        };
+        let planned = destination::plan("output", word, asked.map(Format::name), &self.names())?;
+        planned
+            .into_iter()
+            .map(|place| {
+                let format = output_format(word, asked, &place.sink)?;
+                Ok((place, format))
+            })
+            .collect::<Result<_>>()
+            .map(Some)
+    }
+
+    fn plan_previews(&self) -> Result<Option<Vec<Destination>>> {
+        match self.preview.and_then(|preview| preview.preview.as_deref()) {
+            None => Ok(None),
+            Some("-") => Err(Error::parameter(
+                "preview",
+                "-",
+                "a picture goes to a file, not to standard output",
+            )),
+            Some(word) => destination::plan("preview", word, Some("png"), &self.names()).map(Some),
+        }
+    }
+}
+
+/// The format to write: as asked, or as the name tells.
+fn output_format(word: &str, asked: Option<Format>, sink: &Sink) -> Result<Format> {
+    let format = asked.or_else(|| sink.format());
+    format.filter(|format| format.is_written()).ok_or_else(|| {
+        let names: Vec<_> = Format::all()
+            .filter(|format| format.is_written())
+            .map(Format::name)
+            .collect();
+        let names = names.join(", ");
+        let problem =
+            format!("its name tells no format that is written; --output-format is one of: {names}");
+        Error::parameter("output", word, problem)
+    })
+}
+
+impl<'a> Context<'a> {
+    /// Starts the clock and the threads.
+    pub fn new(common: &'a Common) -> Result<Self> {
+        let start = Moment::now();
+        let threads = machine::threads(common.threads);
+        let pool = ThreadPoolBuilder::new()
+            .num_threads(threads)
+            .build()
+            .map_err(|e| Error::parameter("threads", threads, e.to_string()))?;
+        Ok(Context {
+            common,
+            pool,
+            memory: common.max_memory.unwrap_or_else(machine::default_memory),
+            start,
+        })
+    }
+
+    /// Bytes that may be taken.
+    pub fn memory(&self) -> u64 {
+        self.memory
+    }
+
+    /// Worker threads.
+    pub fn threads(&self) -> usize {
+        self.pool.current_num_threads()
+    }
+
+    /// The options that every working command has.
+    pub fn common(&self) -> &Common {
+        self.common
+    }
+
+    /// Does `work` for each job and reports on it; says what went wrong and goes on with the next.
+    ///
+    /// What is wrong with the command line as a whole is an error before any work is done.
+    pub fn run<P, R>(
+        &self,
+        command: &'static str,
+        files: &Files,
+        work: impl Fn(&mut Job) -> Result<Found<P, R>> + Sync,
+    ) -> Result<Exit>
+    where
+        P: Serialize + Send,
+        R: Serialize + Send,
+    {
+        let jobs = files.jobs();
+        let outputs = files.plan_outputs()?;
+        let previews = files.plan_previews()?;
+        let report = self.report_sink(outputs.as_deref())?;
+        refuse_conflicts(files, outputs.as_deref(), previews.as_deref(), &report)?;
+
+        let with_bar = !self.common.quiet && progress::is_watched();
+        let start = Cell::new(self.start);
+        let mut lines = Vec::new();
+        let mut worst = Exit::Done;
+        for (index, inputs) in jobs.iter().enumerate() {
+            let output = outputs.as_ref().map(|all| all[index].clone());
+            let preview = previews.as_ref().map(|all| all[index].clone());
+            let mut job = Job::new(self, inputs, files.format, start.get(), with_bar);
+            job.send_to(output, preview);
+            let found = self.pool.install(|| work(&mut job));
+            worst = worst.max(match found {
+                Err(error) => job.fail(error),
+                Ok(found) => {
+                    let (document, exit) = job.finish(command, found, jobs.len() == 1);
+                    if report == Some(Sink::Stdout) {
+                        exit.max(ending(print(&document)))
+                    } else {
+                        lines.extend(document);
+                        exit
+                    }
+                }
+            });
+            start.set(Moment::now());
+        }
+        match report {
+            Some(sink @ Sink::File(_)) if !lines.is_empty() => {
+                let written = sink.write_as("json", |out| out.write_all(&lines));
+                Ok(worst.max(ending(written)))
+            }
+            _ => Ok(worst),
+        }
+    }
+
+    /// Where reports go: standard output carries the result or the report, never both.
+    fn report_sink(&self, outputs: Option<&[(Destination, Format)]>) -> Result<Option<Sink>> {
+        let data_on_stdout =
+            outputs.is_some_and(|all| all.iter().any(|(place, _)| place.sink == Sink::Stdout));
+        match (self.common.report.as_deref(), data_on_stdout) {
+            (Some("-"), true) => Err(Error::parameter(
+                "report",
+                "-",
+                "standard output carries the result already (--output -)",
+            )),
+            (Some(word), _) => Ok(Some(Sink::new(word))),
+            (None, true) => Ok(None),
+            (None, false) => Ok(Some(Sink::Stdout)),
+        }
+    }
+}
+
+fn ending<T>(result: Result<T>) -> Exit {
+    match result {
+        Ok(_) => Exit::Done,
+        Err(error) => complain(&error, None),
+    }
+}
+
+fn refuse_conflicts(
+    files: &Files,
+    outputs: Option<&[(Destination, Format)]>,
+    previews: Option<&[Destination]>,
+    report: &Option<Sink>,
+) -> Result<()> {
+    if files.inputs.iter().filter(|input| *input == "-").count() > 1 {
+        let problem = "standard input can be read only once";
+        return Err(Error::parameter("input", "-", problem));
+    }
+    let outputs = outputs.into_iter().flatten();
+    let previews = previews.into_iter().flatten();
+    let written: Vec<_> = outputs
+        .map(|(place, _)| ("output", &place.sink))
+        .chain(previews.map(|place| ("preview", &place.sink)))
+        .chain(report.iter().map(|sink| ("report", sink)))
+        .collect();
+    destination::refuse_overlap(files.inputs, &written)
+}

@@ -1,0 +1,78 @@
+//! `scantle convert`: from one format to another.
+
+use crate::context::{Context, Files};
+use crate::exit::Exit;
+use crate::job::{Found, Job};
+use crate::shared::{Common, Inputs, Output};
+use crate::words;
+use scantle::error::Result;
+use scantle::io;
+use scantle::io::format::{Format, Kind};
+use schemars::JsonSchema;
+use serde::Serialize;
+
+/// Write a mesh or a volume in another format
+///
+/// Vertices, faces, voxels and their order stay as they are. What the output format cannot hold is
+/// left out, and a warning counts it.
+#[derive(Debug, clap::Args)]
+#[command(after_long_help = EXAMPLES)]
+pub struct Args {
+    #[command(flatten)]
+    inputs: Inputs,
+    #[command(flatten)]
+    output: Output,
+    #[command(flatten)]
+    common: Common,
+}
+
+const EXAMPLES: &str = "\
+Examples:
+  scantle convert fixtures/shapes/cube.obj -o cube.ply
+  scantle convert fixtures/shapes/*.obj -o {stem}.stl
+";
+
+/// What was asked for.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct Params {
+    /// The format that was written.
+    output_format: Option<&'static str>,
+}
+
+/// What was done.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct Stats {
+    /// What was converted: `mesh` or `volume`.
+    kind: &'static str,
+}
+
+/// The report of this command.
+pub type Report = scantle::report::Report<Params, Stats>;
+
+/// Converts each input.
+pub fn run(args: &Args) -> Result<Exit> {
+    let context = Context::new(&args.common)?;
+    let files = Files::each(&args.inputs).output(&args.output);
+    context.run("convert", &files, convert)
+}
+
+fn convert(job: &mut Job) -> Result<Found<Params, Stats>> {
+    let content = job.read()?;
+    let kind = match &content {
+        io::Content::Mesh(_) => Kind::Mesh,
+        io::Content::Volume(_) => Kind::Volume,
+    };
+    job.expect_output(&[kind])?;
+    match &content {
+        io::Content::Mesh(mesh) => job.write_mesh(mesh)?,
+        io::Content::Volume(volume) => job.write_volume(volume)?,
+    }
+    let params = Params {
+        output_format: job.output_format().map(Format::name),
+    };
+    let summary = job
+        .input()
+        .map(|input| words::content(&input.content))
+        .unwrap_or_default();
+    Ok(Found::new(params, Stats { kind: kind.name() }, summary))
+}

@@ -1,0 +1,110 @@
+//! `scantle info`: what is in a file, and what looks wrong with it.
+
+use crate::context::{Context, Files};
+use crate::exit::Exit;
+use crate::job::{Found, Job};
+use crate::shared::{Common, Inputs};
+use crate::words;
+use scantle::error::Result;
+use scantle::io::Content;
+use scantle::mesh::topology::{Topology, topology};
+use scantle::volume::Volume;
+use schemars::JsonSchema;
+use serde::Serialize;
+
+/// Tell what is in a file, and what looks wrong with it
+///
+/// Counts, bounds and, of a mesh, its topology: whether it is closed, oriented and manifold.
+#[derive(Debug, clap::Args)]
+#[command(after_long_help = EXAMPLES)]
+pub struct Args {
+    #[command(flatten)]
+    inputs: Inputs,
+    #[command(flatten)]
+    common: Common,
+}
+
+const EXAMPLES: &str = "\
+Examples:
+  scantle info fixtures/shapes/cube.obj
+  scantle info fixtures/shapes/*.obj --report shapes.jsonl
+";
+
+/// This command has no parameters.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct Params {}
+
+/// What is in the file.
+#[derive(Debug, Serialize, JsonSchema)]
+#[serde(tag = "kind", rename_all = "kebab-case")]
+pub enum Stats {
+    /// Triangles, polylines, points.
+    Mesh(Topology),
+    /// Voxels.
+    Volume(VolumeStats),
+}
+
+/// What is in a volume.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct VolumeStats {
+    /// Centre of voxel (0, 0, 0).
+    origin: [f64; 3],
+    /// Distance between neighbouring voxels along each axis.
+    spacing: [f64; 3],
+    /// Whether each axis of the grid points along its own coordinate axis.
+    straight: bool,
+    /// Voxels.
+    voxels: u64,
+    /// Voxels that are not 0.
+    set: u64,
+    /// Smallest value, null in a volume without voxels.
+    min: Option<f64>,
+    /// Largest value, null in a volume without voxels.
+    max: Option<f64>,
+}
+
+/// The report of this command.
+pub type Report = scantle::report::Report<Params, Stats>;
+
+/// Looks into each input.
+pub fn run(args: &Args) -> Result<Exit> {
+    let context = Context::new(&args.common)?;
+    context.run("info", &Files::each(&args.inputs), look)
+}
+
+fn look(job: &mut Job) -> Result<Found<Params, Stats>> {
+    let content = job.read()?;
+    let mut summary = job
+        .input()
+        .map(|input| words::content(&input.content))
+        .unwrap_or_default();
+    let stats = match content {
+        Content::Mesh(mesh) => {
+            let topology = topology(&mesh, job.progress())?;
+            job.warn(topology.warnings());
+            summary += if topology.closed { ", closed" } else { "" };
+            Stats::Mesh(topology)
+        }
+        Content::Volume(volume) => {
+            job.progress().stage("count", 0);
+            let stats = volume_stats(&volume);
+            summary += &format!(", {} set", stats.set);
+            Stats::Volume(stats)
+        }
+    };
+    Ok(Found::new(Params {}, stats, summary))
+}
+
+fn volume_stats(volume: &Volume) -> VolumeStats {
+    let frame = &volume.frame;
+    let range = volume.range();
+    VolumeStats {
+        origin: frame.origin,
+        spacing: frame.spacing(),
+        straight: frame.is_straight(),
+        voxels: frame.len() as u64,
+        set: volume.count_set(),
+        min: range.map(|[min, _]| min),
+        max: range.map(|[_, max]| max),
+    }
+}

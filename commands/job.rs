@@ -1,0 +1,363 @@
+//! One job: what is read, made and written for one report.
+
+use crate::context::Context;
+use crate::destination::Destination;
+use crate::exit::Exit;
+use crate::machine::{Moment, peak_bytes};
+use crate::progress::Recorder;
+use crate::streams::{complain, say};
+use crate::words;
+use scantle::error::{Error, Result};
+use scantle::io::format::{Format, Kind};
+use scantle::io::sink::Sink;
+use scantle::io::source::Source;
+use scantle::io::{self, Content};
+use scantle::mesh::Mesh;
+use scantle::progress::Progress;
+use scantle::report::{
+    Accuracy, Input, Measures, Modelled, Output, Report, Run, SCHEMA, Stage, Warning,
+};
+use scantle::volume::Volume;
+use serde::Serialize;
+
+/// What a command found: the part of the report that is its own.
+pub struct Found<P, R> {
+    parameters: P,
+    result: R,
+    summary: String,
+    accuracy: Option<Measures>,
+    modelled: Option<Modelled>,
+    check: Option<(&'static str, f64)>,
+}
+
+impl<P, R> Found<P, R> {
+    /// Parameters and result for the report, and a few words for a person.
+    pub fn new(parameters: P, result: R, summary: impl Into<String>) -> Self {
+        Found {
+            parameters,
+            result,
+            summary: summary.into(),
+            accuracy: None,
+            modelled: None,
+            check: None,
+        }
+    }
+
+    /// With the error that was made.
+    pub fn accuracy(mut self, accuracy: Measures) -> Self {
+        self.accuracy = Some(accuracy);
+        self
+    }
+
+    /// With how much of the full model was built.
+    pub fn modelled(mut self, modelled: Modelled) -> Self {
+        self.modelled = Some(modelled);
+        self
+    }
+
+    /// With the check that the error is no larger than what `--OPTION` says, if it says anything.
+    pub fn check(mut self, option: &'static str, most: Option<f64>) -> Self {
+        self.check = most.map(|most| (option, most));
+        self
+    }
+
+    /// Why the check fails, if it was asked for and does. It is about the first measure.
+    fn failure(&self) -> Option<String> {
+        let (option, most) = self.check?;
+        let first = match &self.accuracy {
+            Some(Measures::One(accuracy)) => Some(accuracy),
+            Some(Measures::Many(all)) => all.first(),
+            None => None,
+        };
+        let Some(Accuracy {
+            measure,
+            unit,
+            bound,
+            reached,
+            ..
+        }) = first
+        else {
+            return Some(format!("no error is known to compare with --{option}"));
+        };
+        let (verb, error) = match (reached, bound) {
+            (Some(reached), _) => ("is", *reached),
+            (None, Some(bound)) => ("may be up to", *bound),
+            (None, None) => return Some(format!("{measure} is neither measured nor bounded")),
+        };
+        // Written so that an error which is no number fails too.
+        let holds = error <= most;
+        (!holds).then(|| format!("{measure} {verb} {error} {unit}, larger than --{option} {most}"))
+    }
+}
+
+/// One job: reads, writes, and keeps what the report will say about that.
+pub struct Job<'a> {
+    context: &'a Context<'a>,
+    words: &'a [String],
+    format: Option<Format>,
+    output: Option<(Destination, Format)>,
+    preview: Option<Destination>,
+    recorder: Recorder,
+    read: Vec<Input>,
+    written: Vec<Output>,
+    warnings: Vec<Warning>,
+    opened: usize,
+}
+
+impl<'a> Job<'a> {
+    pub(crate) fn new(
+        context: &'a Context<'a>,
+        words: &'a [String],
+        format: Option<Format>,
+        start: Moment,
+        with_bar: bool,
+    ) -> Self {
+        Job {
+            context,
+            words,
+            format,
+            output: None,
+            preview: None,
+            recorder: Recorder::new(start, with_bar),
+            read: Vec::new(),
+            written: Vec::new(),
+            warnings: Vec::new(),
+            opened: 0,
+        }
+    }
+
+    pub(crate) fn send_to(
+        &mut self,
+        output: Option<(Destination, Format)>,
+        preview: Option<Destination>,
+    ) {
+        self.output = output;
+        self.preview = preview;
+    }
+
+    /// Who hears how far the work is.
+    pub fn progress(&self) -> &dyn Progress {
+        &self.recorder
+    }
+
+    /// Bytes that an algorithm may take.
+    pub fn memory(&self) -> u64 {
+        self.context.memory()
+    }
+
+    /// The format of the result, if one is to be written.
+    pub fn output_format(&self) -> Option<Format> {
+        self.output.as_ref().map(|(_, format)| *format)
+    }
+
+    /// Refuses, before any work, a result whose kind the output format cannot hold.
+    pub fn expect_output(&self, kinds: &[Kind]) -> Result<()> {
+        match self.output_format() {
+            Some(format) if !kinds.contains(&format.kind()) => {
+                let made: Vec<_> = kinds.iter().map(|kind| kind.name()).collect();
+                let (made, held) = (made.join(" or a "), format.kind().name());
+                let problem = format!("holds a {held}, but a {made} is made here");
+                Err(Error::parameter("output-format", format.name(), problem))
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// Reads the next input.
+    pub fn read(&mut self) -> Result<Content> {
+        self.read_with(io::read)
+    }
+
+    /// Reads the next input, which must be a mesh.
+    pub fn read_mesh(&mut self) -> Result<Mesh> {
+        self.read_with(io::read_mesh)
+    }
+
+    /// Reads the next input, which must be a volume.
+    pub fn read_volume(&mut self) -> Result<Volume> {
+        self.read_with(io::read_volume)
+    }
+
+    fn read_with<T>(
+        &mut self,
+        reader: impl Fn(&Source, Option<Format>) -> Result<(T, Input, Vec<Warning>)>,
+    ) -> Result<T> {
+        self.recorder.stage("read", 0);
+        let word = &self.words[self.opened];
+        self.opened += 1;
+        let source = Source::open(word, self.context.memory())?;
+        let (content, input, warnings) = reader(&source, self.format)?;
+        self.read.push(input);
+        self.warn(warnings);
+        Ok(content)
+    }
+
+    /// What the report says about the input read last.
+    pub fn input(&self) -> Option<&Input> {
+        self.read.last()
+    }
+
+    /// Adds warnings to the report and, unless `--quiet`, to standard error.
+    pub fn warn(&mut self, warnings: Vec<Warning>) {
+        self.warnings.extend(warnings);
+    }
+
+    /// Writes the result, if the user wants it.
+    pub fn write_mesh(&mut self, mesh: &Mesh) -> Result<()> {
+        self.write_with(|sink, format| io::write_mesh(mesh, sink, format))
+    }
+
+    /// Writes the result, if the user wants it.
+    pub fn write_volume(&mut self, volume: &Volume) -> Result<()> {
+        self.write_with(|sink, format| io::write_volume(volume, sink, format))
+    }
+
+    fn write_with(
+        &mut self,
+        writer: impl FnOnce(&Sink, Format) -> Result<(Vec<Output>, Vec<Warning>)>,
+    ) -> Result<()> {
+        let Some((place, format)) = &self.output else {
+            return Ok(());
+        };
+        self.recorder.stage("write", 0);
+        place.prepare()?;
+        let (outputs, warnings) = writer(&place.sink, *format)?;
+        self.written.extend(outputs);
+        self.warn(warnings);
+        Ok(())
+    }
+
+    /// Draws and writes a picture (the bytes of a PNG file), if the user wants one.
+    pub fn write_preview(
+        &mut self,
+        draw: impl FnOnce(&dyn Progress) -> Result<Vec<u8>>,
+    ) -> Result<()> {
+        let Some(place) = &self.preview else {
+            return Ok(());
+        };
+        self.recorder.stage("preview", 0);
+        let picture = draw(&self.recorder)?;
+        self.recorder.stage("write", 0);
+        place.prepare()?;
+        let output = place
+            .sink
+            .write_as("png", |out| out.write_all(&picture))?;
+        self.written.push(output);
+        Ok(())
+    }
+
+    /// Ends the job: says what is for people, and returns the report's bytes and the exit code.
+    pub(crate) fn finish<P: Serialize, R: Serialize>(
+        mut self,
+        command: &'static str,
+        found: Found<P, R>,
+        alone: bool,
+    ) -> (Vec<u8>, Exit) {
+        let stages = self.recorder.finish();
+        let failure = found.failure();
+        self.tell(&found.summary, &stages);
+        if let Some(why) = &failure {
+            say(format_args!("{}: check failed: {why}", self.words[0]));
+        }
+        let run = self.context.common().timings.then(|| Run {
+            wall_s: stages.iter().map(|stage| stage.wall_s).sum(),
+            cpu_s: stages.iter().map(|stage| stage.cpu_s).sum(),
+            peak_bytes: peak_bytes(),
+            threads: self.context.threads(),
+            stages,
+        });
+        let report = Report {
+            schema: SCHEMA,
+            scantle: env!("CARGO_PKG_VERSION").to_owned(),
+            command: command.to_owned(),
+            input: self.read,
+            output: self.written,
+            parameters: found.parameters,
+            result: found.result,
+            accuracy: found.accuracy,
+            modelled: found.modelled,
+            warnings: self.warnings,
+            run,
+        };
+        let exit = failure.map_or(Exit::Done, |_| Exit::CheckFailed);
+        (words::json(&report, alone), exit)
+    }
+
+    /// Ends the job that failed: says why, with the file that it is about.
+    pub(crate) fn fail(mut self, error: Error) -> Exit {
+        self.recorder.finish();
+        let file = &self.words[self.opened.saturating_sub(1)];
+        let error = match error {
+            Error::Geometry(fault) => Error::Malformed {
+                path: file.into(),
+                fault,
+            },
+            other => other,
+        };
+        complain(&error, Some(file))
+    }
+
+    fn tell(&self, summary: &str, stages: &[Stage]) {
+        let common = self.context.common();
+        if common.quiet {
+            return;
+        }
+        let file = &self.words[0];
+        if common.verbose {
+            for input in &self.read {
+                say(format_args!("{}: {}", input.path, words::input(input)));
+            }
+        }
+        for warning in &self.warnings {
+            say(format_args!("{file}: warning: {}", words::warning(warning)));
+        }
+        let written: String = self.written.iter().map(words::output).collect();
+        say(format_args!("{file}: {summary}{written}"));
+        if common.verbose {
+            for stage in stages {
+                let (wall, cpu) = (stage.wall_s, stage.cpu_s);
+                say(format_args!(
+                    "{file}: {} took {wall:.3} s, {cpu:.3} s of processor time",
+                    stage.name
+                ));
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn found(reached: Option<f64>, bound: Option<f64>, most: Option<f64>) -> Found<(), ()> {
+        let accuracy = Accuracy {
+            measure: "distance".into(),
+            unit: "voxel".into(),
+            bound,
+            reached,
+            reference: "sphere".into(),
+            verified: reached.is_some(),
+        };
+        Found::new((), (), "")
+            .accuracy(Measures::One(accuracy))
+            .check("max-error", most)
+    }
+
+    #[test]
+    fn the_error_reached_is_checked_and_else_its_bound() {
+        assert_eq!(found(Some(2.0), None, None).failure(), None);
+        assert_eq!(found(Some(0.5), Some(0.9), Some(0.5)).failure(), None);
+        assert_eq!(
+            found(Some(0.6), Some(0.9), Some(0.5)).failure().as_deref(),
+            Some("distance is 0.6 voxel, larger than --max-error 0.5")
+        );
+        assert_eq!(
+            found(None, Some(0.9), Some(0.5)).failure().as_deref(),
+            Some("distance may be up to 0.9 voxel, larger than --max-error 0.5")
+        );
+        assert!(found(Some(f64::NAN), None, Some(0.5)).failure().is_some());
+        assert!(found(None, None, Some(0.5)).failure().is_some());
+        let nothing: Found<(), ()> = Found::new((), (), "").check("max-error", Some(1.0));
+        assert!(nothing.failure().is_some());
+    }
+}

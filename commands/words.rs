@@ -1,0 +1,93 @@
+//! Figures put into words for people, and into JSON for programs.
+
+use scantle::report::{Content, Input, Output, Warning};
+use serde::Serialize;
+use std::fmt::Write;
+
+/// A JSON document that ends with a newline: spread out, or on one line.
+pub fn json(value: &impl Serialize, spread: bool) -> Vec<u8> {
+    let text = if spread {
+        serde_json::to_vec_pretty(value)
+    } else {
+        serde_json::to_vec(value)
+    };
+    let mut text = text.expect("what is reported has names for keys");
+    text.push(b'\n');
+    text
+}
+
+/// `8 vertices, 12 triangles`, `64 x 64 x 32 voxels of u8`.
+pub fn content(content: &Content) -> String {
+    let mut parts = Vec::new();
+    let counts = [
+        (content.vertices, "vertex", "vertices"),
+        (content.triangles, "triangle", "triangles"),
+        (content.segments, "segment", "segments"),
+        (content.points, "point", "points"),
+    ];
+    for (count, one, many) in counts {
+        if let Some(count) = count {
+            parts.push(counted(count, one, many));
+        }
+    }
+    if let Some([x, y, z]) = content.dims {
+        let sample = content.sample_type.as_deref().unwrap_or("unknown type");
+        parts.push(format!("{x} x {y} x {z} voxels of {sample}"));
+    }
+    parts.join(", ")
+}
+
+/// `1 vertex`, `8 vertices`.
+pub fn counted(count: u64, one: &str, many: &str) -> String {
+    format!("{count} {}", if count == 1 { one } else { many })
+}
+
+/// What was read.
+pub fn input(input: &Input) -> String {
+    let (format, bytes) = (&input.format, input.bytes);
+    format!("{format}, {bytes} bytes, {}", content(&input.content))
+}
+
+/// Where something was written: ` -> cube.ply (ply, 394 bytes)`.
+pub fn output(output: &Output) -> String {
+    let (path, format, bytes) = (&output.path, &output.format, output.bytes);
+    format!(" -> {path} ({format}, {bytes} bytes)")
+}
+
+/// `faces without area (12, first 4711)`.
+pub fn warning(warning: &Warning) -> String {
+    let mut text = format!("{} ({}", warning.message, warning.count);
+    if let Some(first) = warning.first {
+        let _ = write!(text, ", first {first}");
+    }
+    text.push(')');
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn counts_are_said_in_the_right_number() {
+        let mesh = Content {
+            vertices: Some(1),
+            triangles: Some(12),
+            ..Content::default()
+        };
+        assert_eq!(content(&mesh), "1 vertex, 12 triangles");
+        let grid = Content {
+            dims: Some([4, 5, 6]),
+            sample_type: Some("u8".into()),
+            ..Content::default()
+        };
+        assert_eq!(content(&grid), "4 x 5 x 6 voxels of u8");
+    }
+
+    #[test]
+    fn a_warning_names_the_first() {
+        let first = |first| warning(&Warning::new("flat", "flat faces", 12, first));
+        assert_eq!(first(Some(4711)), "flat faces (12, first 4711)");
+        assert_eq!(first(None), "flat faces (12)");
+    }
+}

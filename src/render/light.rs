@@ -1,0 +1,107 @@
+//! The key light: one distant lamp with a soft shadow.
+
+use super::{Vec3f, dot};
+use crate::camera::raster::rasterize;
+use crate::camera::{Camera, Size};
+use crate::numeric::vector::Vec3;
+
+/// Texels along a side of the shadow map.
+const MAP: usize = 1400;
+
+/// The map sees this much, in units; the model is a ball of diameter 2.
+const SEEN: f64 = 2.06;
+
+/// Tangent of half the angle at which the lamp appears: a wide softbox.
+const SOFTNESS: f32 = 0.13;
+
+/// Samples to find what stands in the way, and to weigh it.
+const SEARCH: usize = 12;
+const WEIGH: usize = 16;
+
+/// A lamp and the depth of what it sees first.
+pub(super) struct KeyLight {
+    /// From the model to the lamp, in the view space of the picture.
+    pub direction: Vec3f,
+    turn: [Vec3f; 3],
+    shift: Vec3f,
+    /// Distance from the lamp's plane of each texel, infinite where nothing is.
+    map: Vec<f32>,
+    distance: f32,
+}
+
+impl KeyLight {
+    /// The lamp in a direction of the world. `centre` is the camera that frames the model, whose
+    /// target is the middle of the model; `camera` is that of the picture.
+    pub fn new(
+        centre: &Camera,
+        camera: &Camera,
+        direction: Vec3,
+        positions: &[Vec3],
+        triangles: &[[u32; 3]],
+    ) -> KeyLight {
+        let lamp = centre.from_direction(direction, camera.axes[1], SEEN);
+        let size = Size {
+            width: MAP,
+            height: MAP,
+        };
+        let (turn, shift) = lamp.from_other(camera);
+        KeyLight {
+            direction: camera.turn(lamp.axes[2]).map(|c| c as f32),
+            turn: turn.map(|row| row.map(|c| c as f32)),
+            shift: shift.map(|c| c as f32),
+            map: rasterize(&lamp, size, positions, triangles).depth,
+            distance: lamp.distance as f32,
+        }
+    }
+
+    /// The share of the lamp that a place with a normal sees, 0 to 1. `offset` turns the samples.
+    ///
+    /// The further away what stands in the way, the wider the edge of its shadow.
+    ///
+    /// Fernando, "Percentage-closer soft shadows" (2005).
+    pub fn visibility(&self, place: Vec3f, normal: Vec3f, offset: f32) -> f32 {
+        let p: Vec3f = std::array::from_fn(|a| dot(self.turn[a], place) + self.shift[a]);
+        let n = self.turn.map(|row| dot(row, normal));
+        if n[2] <= 0.0 {
+            return 0.0;
+        }
+        const TEXELS: f32 = MAP as f32 / SEEN as f32;
+        let depth = self.distance - p[2];
+        let half = MAP as f32 * 0.5;
+        let middle = [half + p[0] * TEXELS, half - p[1] * TEXELS];
+        // The receiver's own plane: what lies on it casts no shadow on it.
+        let lean = [n[0] / n[2].max(0.1), n[1] / n[2].max(0.1)];
+        let steep = (lean[0] * lean[0] + lean[1] * lean[1]).sqrt();
+        let bias = (1.5 + 1.5 * steep.min(6.0)) / TEXELS;
+        let blocker = |i: usize, of: usize, radius: f32| {
+            // Vogel's disc: evenly spread, each turned by the golden angle.
+            let r = ((i as f32 + 0.5) / of as f32).sqrt() * radius;
+            let (sin, cos) = (i as f32 * 2.399_963 + offset * std::f32::consts::TAU).sin_cos();
+            let (du, dv) = (r * cos, r * sin);
+            let plane = depth + (lean[0] * du + lean[1] * dv).clamp(-0.2, 0.2);
+            let found = self.texel(middle[0] + du * TEXELS, middle[1] - dv * TEXELS);
+            (found < plane - bias - 0.02 * r).then_some(plane - found)
+        };
+        let (mut gap, mut count) = (0.0, 0.0);
+        for way in (0..SEARCH).filter_map(|i| blocker(i, SEARCH, SOFTNESS * 0.8)) {
+            gap += way;
+            count += 1.0;
+        }
+        if count == 0.0 {
+            return 1.0;
+        }
+        let radius = (SOFTNESS * gap / count).clamp(2.5 / TEXELS, SOFTNESS * 1.2);
+        let hidden = (0..WEIGH)
+            .filter(|i| blocker(*i, WEIGH, radius).is_some())
+            .count();
+        1.0 - hidden as f32 / WEIGH as f32
+    }
+
+    #[inline]
+    fn texel(&self, x: f32, y: f32) -> f32 {
+        if x < 0.0 || y < 0.0 || x >= MAP as f32 || y >= MAP as f32 {
+            return f32::INFINITY;
+        }
+        self.map[y as usize * MAP + x as usize]
+    }
+}

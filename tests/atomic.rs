@@ -1,0 +1,78 @@
+//! Outputs are whole or not there, and inputs are never touched.
+
+use crate::support::Workplace;
+use std::fs;
+use std::os::unix::fs::{PermissionsExt, symlink};
+
+#[test]
+fn a_failed_write_leaves_the_old_file_and_nothing_else() {
+    let place = Workplace::new();
+    place.put("old.ply", "old");
+    place.put("bad.obj", "v 0 0 0\nf 1 2 3\n");
+    let ran = place.run("convert bad.obj -o old.ply");
+    assert_eq!(ran.code, 3, "{}", ran.stderr);
+    assert_eq!(fs::read_to_string(place.path("old.ply")).unwrap(), "old");
+    assert_eq!(place.names(), ["bad.obj", "old.ply"]);
+}
+
+#[test]
+fn a_write_that_fails_half_way_leaves_the_old_file_and_nothing_else() {
+    let place = Workplace::new();
+    place.put("old.ply", "old");
+    // No file may grow past one block of 1024 bytes: the disk is full half way.
+    let line = "trap '' XFSZ; ulimit -f 1; scantle convert fixtures/shapes/torus.obj -o old.ply";
+    let ran = place.shell(line);
+    assert_eq!(ran.code, 4, "{}", ran.stderr);
+    assert!(ran.stderr.contains("scantle: old.ply: cannot write: "), "{}", ran.stderr);
+    assert_eq!(fs::read_to_string(place.path("old.ply")).unwrap(), "old");
+    assert_eq!(place.names(), ["old.ply"]);
+}
+
+#[test]
+fn a_folder_in_the_way_is_not_replaced() {
+    let place = Workplace::new();
+    fs::create_dir(place.path("cube.ply")).unwrap();
+    let line = "convert fixtures/shapes/cube.obj -o cube.ply --output-format ply";
+    assert_eq!(place.run(line).code, 0);
+    assert!(place.path("cube.ply/cube.ply").exists());
+    fs::create_dir(place.path("report.json")).unwrap();
+    let ran = place.run("info fixtures/shapes/cube.obj --report report.json");
+    assert_eq!(ran.code, 4, "{}", ran.stderr);
+    assert!(place.path("report.json").is_dir());
+}
+
+#[test]
+fn a_replaced_file_keeps_its_permissions() {
+    let place = Workplace::new();
+    place.put("cube.ply", "old");
+    let path = place.path("cube.ply");
+    fs::set_permissions(&path, fs::Permissions::from_mode(0o640)).unwrap();
+    let ran = place.run("convert fixtures/shapes/cube.obj -o cube.ply");
+    assert_eq!(ran.code, 0, "{}", ran.stderr);
+    let mode = fs::metadata(&path).unwrap().permissions().mode();
+    assert_eq!(mode & 0o777, 0o640);
+    assert_ne!(fs::read(&path).unwrap(), b"old");
+}
+
+#[test]
+fn an_input_is_not_written_over_by_any_name() {
+    let place = Workplace::new();
+    let cube = fs::read(place.path("fixtures/shapes/cube.obj")).unwrap();
+    place.put("cube.obj", &cube);
+    symlink("cube.obj", place.path("other.obj")).unwrap();
+    for line in [
+        "convert cube.obj -o cube.obj",
+        "convert cube.obj -o ./cube.obj",
+        "convert cube.obj -o other.obj",
+        "convert other.obj -o cube.obj",
+        "convert cube.obj -o {stem}.obj",
+        "convert cube.obj -o cube.ply --report cube.obj",
+        "info cube.obj --report cube.obj",
+    ] {
+        let ran = place.run(line);
+        assert_eq!(ran.code, 2, "{line}: {}", ran.stderr);
+        assert!(ran.stderr.contains("inputs are never touched"), "{line}");
+    }
+    assert_eq!(fs::read(place.path("cube.obj")).unwrap(), cube);
+    assert_eq!(place.names(), ["cube.obj", "other.obj"]);
+}

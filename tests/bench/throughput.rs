@@ -1,0 +1,142 @@
+//! How fast things go: one JSON line per measurement, on data made by formula.
+//!
+//! `cargo bench --bench throughput` runs three sizes, each four times the one before, so that the
+//! exponent shows; `-- --quick` runs the smallest once; further words pick benches by name. The
+//! seconds are the least of the repetitions.
+
+use scantle::error::Fault;
+use scantle::io;
+use scantle::io::source::Source;
+use scantle::io::{npy, nrrd, obj, off, ply, stl};
+use scantle::mesh::{Mesh, shapes};
+use scantle::volume::{Data, Frame, Volume};
+use serde_json::json;
+use std::io::Write;
+use std::time::Instant;
+
+/// What to run.
+struct Plan {
+    quick: bool,
+    names: Vec<String>,
+}
+
+impl Plan {
+    fn from_words(words: impl Iterator<Item = String>) -> Self {
+        let (options, names): (Vec<_>, Vec<_>) = words.partition(|word| word.starts_with("--"));
+        Plan {
+            // `cargo bench` adds `--bench`.
+            quick: options.iter().any(|option| option == "--quick"),
+            names,
+        }
+    }
+
+    fn wants(&self, name: &str) -> bool {
+        self.names.is_empty() || self.names.iter().any(|part| name.contains(part))
+    }
+
+    /// Three sizes, each four times the one before.
+    fn sizes(&self, smallest: usize) -> Vec<usize> {
+        let sizes = [smallest, 4 * smallest, 16 * smallest];
+        sizes[..if self.quick { 1 } else { 3 }].to_vec()
+    }
+
+    /// Measures `work` on `elements` of a `unit` and prints a line. It returns the bytes it passed.
+    fn measure(&self, name: &str, unit: &str, elements: usize, mut work: impl FnMut() -> usize) {
+        let repeats = if self.quick { 1 } else { 5 };
+        let mut least = f64::INFINITY;
+        let mut bytes = 0;
+        for _ in 0..repeats {
+            let start = Instant::now();
+            bytes = std::hint::black_box(work());
+            least = least.min(start.elapsed().as_secs_f64());
+        }
+        let line = json!({
+            "bench": name,
+            "unit": unit,
+            "elements": elements,
+            "bytes": bytes,
+            "seconds": least,
+            "elements_per_second": elements as f64 / least,
+            "bytes_per_second": bytes as f64 / least,
+            "repeats": repeats,
+            "threads": rayon::current_num_threads(),
+        });
+        println!("{line}");
+    }
+}
+
+type MeshWriter = fn(&Mesh, &mut dyn Write) -> std::io::Result<()>;
+type VolumeWriter = fn(&Volume, &mut dyn Write) -> std::io::Result<()>;
+
+fn read_back(name: &str, bytes: &[u8]) -> Result<io::Content, Fault> {
+    let source = Source::from_bytes(name, bytes.to_vec());
+    let content = source.and_then(|source| io::read(&source, None));
+    content
+        .map(|(content, _, _)| content)
+        .map_err(|error| Fault::whole(error.to_string()))
+}
+
+fn meshes(plan: &Plan) {
+    let writers: [(&str, MeshWriter); 4] = [
+        ("obj", obj::write),
+        ("off", off::write),
+        ("ply", ply::write),
+        ("stl", stl::write),
+    ];
+    for (format, write) in writers {
+        let (writing, reading) = (format!("write-{format}"), format!("read-{format}"));
+        if !plan.wants(&writing) && !plan.wants(&reading) {
+            continue;
+        }
+        for triangles in plan.sizes(16_384) {
+            let around = ((triangles / 2) as f64).sqrt() as usize;
+            let mesh = shapes::torus([0.0; 3], 1.0, 0.25, around, around);
+            let count = mesh.triangles.len();
+            let mut bytes = Vec::new();
+            plan.measure(&writing, "triangles", count, || {
+                bytes.clear();
+                write(&mesh, &mut bytes).expect("memory can be written");
+                bytes.len()
+            });
+            let name = format!("bench.{format}");
+            plan.measure(&reading, "triangles", count, || {
+                read_back(&name, &bytes).expect("what was written is read");
+                bytes.len()
+            });
+        }
+    }
+}
+
+fn volumes(plan: &Plan) {
+    let writers: [(&str, VolumeWriter); 2] = [("npy", npy::write), ("nrrd", nrrd::write)];
+    for (format, write) in writers {
+        let (writing, reading) = (format!("write-{format}"), format!("read-{format}"));
+        if !plan.wants(&writing) && !plan.wants(&reading) {
+            continue;
+        }
+        for voxels in plan.sizes(1 << 18) {
+            let dims = [64, 64, voxels / 4096];
+            let volume = Volume {
+                frame: Frame::straight(dims, [0.0; 3], [1.0; 3]),
+                data: Data::F32((0..voxels).map(|i| (i % 1021) as f32).collect()),
+            };
+            let mut bytes = Vec::new();
+            plan.measure(&writing, "voxels", voxels, || {
+                bytes.clear();
+                write(&volume, &mut bytes).expect("memory can be written");
+                bytes.len()
+            });
+            let name = format!("bench.{format}");
+            plan.measure(&reading, "voxels", voxels, || {
+                read_back(&name, &bytes).expect("what was written is read");
+                bytes.len()
+            });
+        }
+    }
+}
+
+fn main() {
+    let plan = Plan::from_words(std::env::args().skip(1));
+    meshes(&plan);
+    volumes(&plan);
+}

@@ -1,0 +1,105 @@
+//! Golden reports: a folder `fixtures/COMMAND/CASE/` for each.
+//!
+//! `cmd` holds the words after `scantle`, as if run from the repository root (what it writes goes
+//! to a temporary folder); `report.json` what it prints; `stderr` and `code` how it ends, where
+//! that is not with 0. `UPDATE_GOLDEN=1 cargo test golden` rewrites them; read the difference like
+//! code.
+
+use crate::support::{Ran, Workplace, json, root, updating};
+use jsonschema::Validator;
+use serde_json::Value;
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+/// The folders of all cases.
+fn cases() -> Vec<PathBuf> {
+    let commands = crate::support::files_below(&root().join("fixtures"));
+    commands
+        .into_iter()
+        .filter(|file| file.file_name().is_some_and(|name| name == "cmd"))
+        .map(|file| file.parent().expect("a case has a folder").to_owned())
+        .collect()
+}
+
+#[test]
+fn reports_are_as_they_were() {
+    let cases = cases();
+    assert!(!cases.is_empty(), "there is no case below fixtures/");
+    let mut schemas = BTreeMap::new();
+    let mut wrong = Vec::new();
+    for case in &cases {
+        let name = case.strip_prefix(root()).expect("a case is in here");
+        let line = fs::read_to_string(case.join("cmd")).expect("a case has a cmd");
+        let ran = Workplace::new().run(&line);
+        for report in ran.documents() {
+            let problem = violation(&mut schemas, &line, &report);
+            wrong.extend(problem.map(|problem| format!("{}: {problem}", name.display())));
+        }
+        if updating("UPDATE_GOLDEN") {
+            rewrite(case, &ran);
+            continue;
+        }
+        for difference in differences(case, &ran) {
+            wrong.push(format!("{}: {difference}", name.display()));
+        }
+    }
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}
+
+/// What of the report is not as the schema of its command says.
+fn violation(
+    schemas: &mut BTreeMap<String, Validator>,
+    line: &str,
+    report: &Value,
+) -> Option<String> {
+    let command = line.split_whitespace().next().expect("a line names a command");
+    let schema = schemas.entry(command.to_owned()).or_insert_with(|| {
+        let schema = Workplace::new().run(&format!("schema {command}")).document();
+        jsonschema::validator_for(&schema).expect("a schema")
+    });
+    let error = schema.validate(report).err()?;
+    Some(format!("{}: {error}", error.instance_path()))
+}
+
+fn kept(case: &Path, name: &str) -> String {
+    fs::read_to_string(case.join(name)).unwrap_or_default()
+}
+
+fn differences(case: &Path, ran: &Ran) -> Vec<String> {
+    let mut found = Vec::new();
+    let code: i32 = kept(case, "code").trim().parse().unwrap_or(0);
+    if code != ran.code {
+        found.push(format!("exit code {code} became {}\n{}", ran.code, ran.stderr));
+    }
+    if code != 0 && kept(case, "stderr") != ran.stderr {
+        let (want, got) = (kept(case, "stderr"), &ran.stderr);
+        found.push(format!("standard error\n{want}became\n{got}"));
+    }
+    let (want, got) = (json::documents(&kept(case, "report.json")), ran.documents());
+    if want.len() != got.len() {
+        found.push(format!("{} reports became {}", want.len(), got.len()));
+    }
+    for (want, got) in want.iter().zip(&got) {
+        found.extend(json::differences(want, got));
+    }
+    found
+}
+
+fn rewrite(case: &Path, ran: &Ran) {
+    let code = format!("{}\n", ran.code);
+    let failed = ran.code != 0;
+    let files = [
+        ("report.json", ran.text(), !ran.stdout.is_empty()),
+        ("code", code, failed),
+        ("stderr", ran.stderr.clone(), failed),
+    ];
+    for (name, content, wanted) in files {
+        let path = case.join(name);
+        if wanted {
+            fs::write(path, content).expect("a case can be written");
+        } else if path.exists() {
+            fs::remove_file(path).expect("a case can be written");
+        }
+    }
+}

@@ -1,0 +1,16 @@
+//! All tests that run the binary or look at the repository, in one binary of their own.
+//!
+//! Tests of a function stand beside it, in `src/` and `commands/`.
+
+mod support;
+
+mod atomic;
+mod cli;
+mod determinism;
+mod examples;
+mod fixtures;
+mod golden;
+mod layers;
+mod licences;
+mod malformed;
+mod man;
