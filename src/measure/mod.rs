@@ -6,3 +6,4 @@ mod surface;
 #[cfg(test)]
 mod test_shapes;
 pub mod volume_difference;
+pub mod voxel_error;

@@ -106,7 +106,8 @@ pub enum Levels {
 named!(Levels { Xy = "xy", Xyz = "xyz" });
 
 /// How fine the grid is.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
 pub enum Size {
     /// Voxels along the longest side of the box.
     Resolution(u32),
@@ -118,9 +119,10 @@ pub enum Size {
 pub const DENSE_BYTES: u128 = 1 << 27;
 
 /// What [`voxelize`] is asked for.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct Params {
     /// How fine the grid is.
+    #[serde(flatten)]
     pub size: Size,
     /// Which voxels the surface sets.
     pub mode: Mode,
@@ -135,6 +137,7 @@ pub struct Params {
     /// Along which axes the levels of the pyramid halve.
     pub levels: Levels,
     /// Bytes that may be held.
+    #[serde(skip)]
     pub max_memory: u64,
 }
 
@@ -474,6 +477,11 @@ impl Stats {
                 why,
             ),
         ]
+    }
+
+    /// The grid the voxels stand in.
+    pub fn lattice(&self) -> Lattice {
+        Lattice { lo: self.origin, h: self.spacing[0], dims: self.dims.map(|d| d as usize) }
     }
 
     /// Octree nodes made against the nodes of the full tree.
