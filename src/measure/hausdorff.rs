@@ -181,10 +181,10 @@ impl Piece {
         if self.upper > enough {
             self.upper = self.upper.min(self.bound_by_cuts(to));
         }
-        if self.upper > enough {
-            if let Some(hit) = to.nearest_to_all(&self.corners, self.upper) {
-                self.upper = self.upper.min(hit.distance);
-            }
+        if self.upper > enough
+            && let Some(hit) = to.nearest_to_all(&self.corners, self.upper)
+        {
+            self.upper = self.upper.min(hit.distance);
         }
     }
 
