@@ -16,9 +16,9 @@ use rayon::prelude::*;
 const AMBIENT_RADIUS: f32 = 0.5;
 
 /// Light of the lamp, of the sky above and of what the ground gives back.
-const KEY: Linear = [0.80, 0.765, 0.715];
-const SKY: Linear = [0.60, 0.625, 0.665];
-const BOUNCE: Linear = [0.36, 0.345, 0.325];
+const KEY: Linear = [1.02, 0.985, 0.93];
+const SKY: Linear = [0.46, 0.48, 0.51];
+const BOUNCE: Linear = [0.31, 0.30, 0.285];
 
 /// How dark the shadow on the ground is: under the model, and where the lamp is hidden.
 const CONTACT: f32 = 0.62;
@@ -87,7 +87,8 @@ pub fn render(subject: &Subject, camera: &Camera, size: Size, up: Vec3) -> Raste
                     .map(|c| c * (1.0 - 0.42 * ink))
             } else {
                 let [hidden, lit] = light[at];
-                [shadow(hidden, lit) * edge_fade(at, fine) + 1.0 - edge_fade(at, fine); 3]
+                let fade = ground.nearness(samples.place[at]) * edge_fade(at, fine);
+                [mix(1.0, shadow(hidden, lit), fade); 3]
             }
         })
         .collect();
@@ -116,21 +117,23 @@ fn lamp_direction(camera: &Camera, up: Vec3) -> Vec3 {
     let right = normalize(cross(up, camera.axes[2]));
     let front = cross(right, up);
     add(
-        scale(up, 0.98),
-        add(scale(right, -0.62), scale(front, 0.42)),
+        scale(up, 0.85),
+        add(scale(right, -0.72), scale(front, 0.45)),
     )
 }
 
 /// What of white the ground shows.
 fn shadow(hidden: f32, lit: f32) -> f32 {
-    (1.0 - CONTACT * hidden.powf(0.9)) * (1.0 - CAST * (1.0 - lit))
+    (1.0 - CONTACT * hidden.powf(1.15)) * (1.0 - CAST * (1.0 - lit))
 }
 
 /// 0 at the edge of the picture, 1 well inside: shadows never end at an edge.
 fn edge_fade(at: usize, size: Size) -> f32 {
-    let (x, y) = (at % size.width, at / size.width);
-    let near = x.min(y).min(size.width - 1 - x).min(size.height - 1 - y);
-    smoothstep(0.0, size.height as f32 * 0.06, near as f32)
+    let within = |at: usize, count: usize, share: f32| {
+        let near = at.min(count - 1 - at) as f32 / count as f32;
+        smoothstep(0.0, share, near)
+    };
+    within(at % size.width, size.width, 0.16) * within(at / size.width, size.height, 0.07)
 }
 
 /// The light that a material of one colour sends to the viewer.
