@@ -348,29 +348,6 @@ mod tests {
     }
 
     #[test]
-    fn the_size_of_a_model_changes_its_scale_bar_only() {
-        let rows = |factor: f64| {
-            let mut mesh = shapes::octasphere([0.0; 3], 1.0, 12);
-            for p in &mut mesh.positions {
-                *p = p.map(|c| c * factor);
-            }
-            let (width, height, pixels) = decode(&both(&mesh, &ball(factor, 12), 300, 2));
-            pixels[..width * (height - FOOT_ROWS)].to_vec()
-        };
-        // Colours of the file are reduced with the caption in it: near, not equal.
-        let far = |a: &[Srgb], b: &[Srgb]| {
-            let apart = |(p, q): (&Srgb, &Srgb)| (0..3).map(|c| p[c].abs_diff(q[c])).max();
-            a.iter().zip(b).filter_map(apart).max()
-        };
-        let base = rows(1.0);
-        for power in [-100, 100] {
-            let other = rows(2f64.powi(power));
-            assert_eq!(base.len(), other.len());
-            assert!(far(&base, &other) <= Some(8), "{power}");
-        }
-    }
-
-    #[test]
     fn nothing_and_hostile_things_are_drawn_without_a_fault() {
         let params = Params {
             width: 200,
