@@ -29,8 +29,6 @@ pub mod vdb;
 pub mod vti;
 
 #[cfg(test)]
-mod malformed;
-#[cfg(test)]
 mod roundtrip;
 
 use crate::error::{Error, Fault, Result};
