@@ -179,10 +179,46 @@ impl Piece {
             }
         }
         if self.upper > enough {
-            if let Some(hit) = to.nearest_to_all(&self.corners, self.upper) {
-                self.upper = self.upper.min(hit.distance);
-            }
+            self.upper = self.upper.min(self.bound_by_cuts(to));
         }
+        if self.upper > enough
+            && let Some(hit) = to.nearest_to_all(&self.corners, self.upper)
+        {
+            self.upper = self.upper.min(hit.distance);
+        }
+    }
+
+    /// An upper bound from cutting the piece into one part for each element that is nearest to a
+    /// corner: over each part the distance to its element is largest at a corner of the part.
+    ///
+    /// It holds wherever the cuts are; they are made where two elements are equally far. This is
+    /// what bounds a piece that lies across an edge of the other surface.
+    fn bound_by_cuts(&self, to: &Surface) -> f64 {
+        let distance = |i: usize, p: Vec3| to.closest_on(self.hits[i].element, p).distance_squared;
+        let cuts = [0, 1, 2].map(|i| {
+            let j = (i + 1) % 3;
+            (self.hits[i].element != self.hits[j].element).then(|| {
+                let t = equal_point(|t| {
+                    let p = lerp(self.corners[i], self.corners[j], t);
+                    distance(i, p) - distance(j, p)
+                });
+                lerp(self.corners[i], self.corners[j], t)
+            })
+        });
+        let middle = match cuts {
+            [Some(a), Some(b), Some(c)] => {
+                Some(std::array::from_fn(|k| (a[k] + b[k] + c[k]) / 3.0))
+            }
+            _ => None,
+        };
+        // The part of a corner ends at the cuts of its two edges and at their common middle.
+        let ends = |i: usize| [cuts[i], cuts[(i + 2) % 3], middle].into_iter().flatten();
+        (0..3)
+            .flat_map(|i| ends(i).map(move |p| (i, p)))
+            .map(|(i, p)| distance(i, p))
+            .chain(self.hits.iter().map(|hit| hit.distance * hit.distance))
+            .fold(0.0, f64::max)
+            .sqrt()
     }
 
     /// The two halves across the longest edge, and what was found in its middle.
@@ -201,4 +237,36 @@ impl Piece {
         });
         (Reached { point, hit }, halves)
     }
+}
+
+/// About where `f`, which is not positive at 0 and not negative at 1, is 0.
+fn equal_point(f: impl Fn(f64) -> f64) -> f64 {
+    let (mut low, mut high) = (0.0, 1.0);
+    let (mut at_low, mut at_high) = (f(low), f(high));
+    // The Illinois rule: an end that stays twice counts half (Dowell, Jarratt 1971).
+    let mut stayed = 0;
+    for _ in 0..8 {
+        if at_high <= at_low {
+            break;
+        }
+        let t = low - at_low * (high - low) / (at_high - at_low);
+        let value = f(t);
+        if value == 0.0 {
+            return t;
+        }
+        if value < 0.0 {
+            (low, at_low) = (t, value);
+            if stayed == 1 {
+                at_high *= 0.5;
+            }
+            stayed = 1;
+        } else {
+            (high, at_high) = (t, value);
+            if stayed == -1 {
+                at_low *= 0.5;
+            }
+            stayed = -1;
+        }
+    }
+    if -at_low < at_high { low } else { high }
 }

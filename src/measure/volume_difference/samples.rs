@@ -260,6 +260,7 @@ fn whole_row(slices: &Slices, row: usize, [nx, ny]: [usize; 2], out: &mut Vec<i1
     }
 }
 
+#[allow(clippy::unnecessary_cast)] // one of the ten types is f64 already
 fn real_row(slices: &Slices, row: usize, [nx, ny]: [usize; 2], out: &mut Vec<f64>) {
     match slices {
         Slices::Bits(grid, z0) => {
