@@ -39,10 +39,10 @@ pub fn read(source: &Source, warnings: &mut Vec<Warning>) -> Result<Volume, Faul
             runs.len()
         )));
     }
-    if BitGrid::bytes_for(dims) > u128::from(source.limit()) {
+    let needed = BitGrid::bytes_for(dims) + BitGrid::bytes_for(Planes::dims(dims));
+    if needed > u128::from(source.limit()) {
         return Err(Fault::whole(format!(
-            "a grid of {nx} x {ny} x {nz} takes {} bytes, over the limit of {} bytes",
-            BitGrid::bytes_for(dims),
+            "a grid of {nx} x {ny} x {nz} takes {needed} bytes to read, over the limit of {} bytes",
             source.limit()
         ))
         .with_hint("raise --max-memory"));
@@ -64,6 +64,7 @@ pub fn read(source: &Source, warnings: &mut Vec<Warning>) -> Result<Volume, Faul
 fn fill(grid: &mut BitGrid, runs: &[u8], start: usize) -> Result<usize, Fault> {
     let [nx, ny, nz] = grid.dims();
     let voxels = nx * ny * nz;
+    let mut planes = Planes::new([nx, ny, nz]);
     let mut at = 0;
     let mut used = 0;
     let (pairs, _) = runs.as_chunks::<2>();
@@ -82,17 +83,7 @@ fn fill(grid: &mut BitGrid, runs: &[u8], start: usize) -> Result<usize, Fault> {
             ));
         }
         if *value != 0 {
-            let (mut x, mut z, mut y) = (at / ny / nz, at / ny % nz, at % ny);
-            for _ in at..end {
-                grid.set(x, y, z);
-                y += 1;
-                if y == ny {
-                    (y, z) = (0, z + 1);
-                }
-                if z == nz {
-                    (z, x) = (0, x + 1);
-                }
-            }
+            planes.set(grid, at, end);
         }
         at = end;
         used += 2;
@@ -103,7 +94,62 @@ fn fill(grid: &mut BitGrid, runs: &[u8], start: usize) -> Result<usize, Fault> {
             format!("the runs end after {at} of {voxels} voxels"),
         ));
     }
+    planes.hand_on(grid);
     Ok(used)
+}
+
+/// Up to 64 planes of one x being read, y along rows, then z, then x: runs are runs of a row there,
+/// and blocks of 64 x 64 bits are turned into the grid.
+struct Planes {
+    bits: BitGrid,
+    /// Where along x they are: the word of a row of the grid.
+    block: usize,
+}
+
+impl Planes {
+    fn dims([nx, ny, nz]: [usize; 3]) -> [usize; 3] {
+        [ny, nz, nx.min(PLANES)]
+    }
+
+    fn new(dims: [usize; 3]) -> Self {
+        Planes {
+            bits: BitGrid::new(Planes::dims(dims)),
+            block: 0,
+        }
+    }
+
+    /// Sets voxels by their place in the file.
+    fn set(&mut self, grid: &mut BitGrid, mut at: usize, end: usize) {
+        let [ny, nz, _] = self.bits.dims();
+        while at < end {
+            let (x, z, y) = (at / ny / nz, at / ny % nz, at % ny);
+            if x / PLANES != self.block {
+                self.hand_on(grid);
+                self.bits.clear();
+                self.block = x / PLANES;
+            }
+            let count = (end - at).min(ny - y);
+            self.bits.set_run(y, y + count, z, x % PLANES);
+            at += count;
+        }
+    }
+
+    /// Copies the planes into the grid.
+    fn hand_on(&self, grid: &mut BitGrid) {
+        let [ny, nz, depth] = self.bits.dims();
+        for z in 0..nz {
+            for y0 in (0..ny).step_by(64) {
+                let mut block = [0; 64];
+                for (x, word) in (0..depth).zip(&mut block) {
+                    *word = self.bits.row(z, x)[y0 / 64];
+                }
+                transpose(&mut block);
+                for (y, word) in (y0..ny).zip(block) {
+                    grid.row_mut(y, z)[self.block] = word;
+                }
+            }
+        }
+    }
 }
 
 struct Header {
