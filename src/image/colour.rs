@@ -75,8 +75,8 @@ pub fn class(index: usize) -> Srgb {
 }
 
 fn along(stops: &[Srgb], t: f64) -> Srgb {
-    // `max` first: it turns NaN into 0.
-    let place = t.max(0.0).min(1.0) * (stops.len() - 1) as f64;
+    let t = if t.is_nan() { 0.0 } else { t.clamp(0.0, 1.0) };
+    let place = t * (stops.len() - 1) as f64;
     let below = (place as usize).min(stops.len() - 2);
     let part = place - below as f64;
     std::array::from_fn(|c| {
@@ -117,10 +117,10 @@ static BYTES: LazyLock<Vec<u8>> = LazyLock::new(|| {
     (0..=STEPS).map(byte).collect()
 });
 
-/// The nearest colour on the sRGB curve; light above 1 is clipped.
+/// The nearest colour on the sRGB curve; light above 1 is clipped, NaN is black.
 pub fn to_srgb(light: Linear) -> Srgb {
     let table = &*BYTES;
-    light.map(|v| table[(v.max(0.0).min(1.0) * STEPS as f32 + 0.5) as usize])
+    light.map(|v| table[(v.clamp(0.0, 1.0) * STEPS as f32 + 0.5) as usize])
 }
 
 #[cfg(test)]
@@ -141,6 +141,8 @@ mod tests {
         assert_eq!(amount(1.0), AMOUNT[9]);
         assert_eq!(signed(0.0), SIGNED[2]);
         assert_eq!(signed(f64::INFINITY), SIGNED[4]);
+        assert_eq!(amount(f64::NAN), AMOUNT[0]);
+        assert_eq!(signed(f64::NAN), SIGNED[0]);
         assert_eq!(class(1), OKABE_ITO[2]);
         assert_eq!(class(7), class(0));
     }

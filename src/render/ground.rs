@@ -1,6 +1,6 @@
 //! The white ground that a model stands on: seen only by the shadow on it.
 
-use super::{Vec3f, dot, mix};
+use super::{Vec3f, dot, mix, smoothstep};
 use crate::camera::raster::rasterize;
 use crate::camera::{Camera, Lens, Size};
 use crate::numeric::vector::{Vec3, scale};
@@ -91,6 +91,12 @@ impl Ground {
             return [0.0, 0.0, -1e4];
         }
         std::array::from_fn(|a| from[a] + away[a] * way)
+    }
+
+    /// 1 under the model, 0 where its shadow is to have ended, smooth in between.
+    pub fn nearness(&self, place: Vec3f) -> f32 {
+        let [x, y] = [0, 1].map(|a| dot(self.turn[a], place) + self.shift[a]);
+        1.0 - smoothstep(0.75, 1.7, (x * x + y * y).sqrt())
     }
 
     /// The share of the sky that the model hides from a place on the ground, 0 to 1.

@@ -6,7 +6,7 @@ use crate::camera::{Camera, Size};
 use crate::numeric::vector::Vec3;
 
 /// Texels along a side of the shadow map.
-const MAP: usize = 1400;
+const MAP: usize = 1280;
 
 /// The map sees this much, in units; the model is a ball of diameter 2.
 const SEEN: f64 = 2.06;
@@ -15,8 +15,8 @@ const SEEN: f64 = 2.06;
 const SOFTNESS: f32 = 0.13;
 
 /// Samples to find what stands in the way, and to weigh it.
-const SEARCH: usize = 12;
-const WEIGH: usize = 16;
+const SEARCH: usize = 10;
+const WEIGH: usize = 12;
 
 /// A lamp and the depth of what it sees first.
 pub(super) struct KeyLight {

@@ -246,3 +246,146 @@ fn round_length(most: f64) -> (f64, String) {
     };
     (f64::from(digit) * 10f64.powi(power), name)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mesh::shapes;
+    use crate::volume::bits::BitGrid;
+    use crate::volume::{Data, Frame};
+
+    /// A ball of voxels of edge `h` around the origin.
+    fn ball(radius: f64, n: usize) -> Volume {
+        let h = 2.0 * radius / n as f64;
+        let mut bits = BitGrid::new([n; 3]);
+        let at = |i: usize| (i as f64 + 0.5) * h - radius;
+        for i in 0..n * n * n {
+            let [x, y, z] = [i % n, i / n % n, i / n / n];
+            if crate::numeric::vector::length([at(x), at(y), at(z)]) <= radius {
+                bits.set(x, y, z);
+            }
+        }
+        Volume {
+            frame: Frame::straight([n; 3], [at(0); 3], [h; 3]),
+            data: Data::Bits(bits),
+        }
+    }
+
+    fn both(mesh: &Mesh, volume: &Volume, width: usize, threads: usize) -> Vec<u8> {
+        let panels = [
+            Panel {
+                label: "ball.obj",
+                what: What::Mesh(mesh),
+                colour: colour::CLAY,
+            },
+            Panel {
+                label: "16 × 16 × 16 voxels",
+                what: What::Voxels(volume),
+                colour: colour::class(1),
+            },
+        ];
+        let params = Params {
+            width,
+            ..Params::DEFAULT
+        };
+        let pool = rayon::ThreadPoolBuilder::new()
+            .num_threads(threads)
+            .build()
+            .expect("a pool");
+        pool.install(|| side_by_side(&panels, "error ≤ 0.87 voxel", "mm", &params))
+            .expect("a picture")
+    }
+
+    /// Width, height and pixels.
+    fn decode(bytes: &[u8]) -> (usize, usize, Vec<Srgb>) {
+        let mut decoder = png::Decoder::new(std::io::Cursor::new(bytes));
+        decoder.set_transformations(png::Transformations::EXPAND);
+        let mut reader = decoder.read_info().expect("a header");
+        let mut bytes = vec![0; reader.output_buffer_size().expect("a size")];
+        let info = reader.next_frame(&mut bytes).expect("a frame");
+        let pixels = bytes.chunks_exact(3).map(|p| [p[0], p[1], p[2]]).collect();
+        (info.width as usize, info.height as usize, pixels)
+    }
+
+    #[test]
+    fn a_preview_is_the_same_on_any_number_of_threads_and_small() {
+        let (mesh, volume) = (shapes::octasphere([0.0; 3], 1.0, 24), ball(1.0, 16));
+        let one = both(&mesh, &volume, 1024, 1);
+        assert_eq!(one, both(&mesh, &volume, 1024, 4));
+        assert!(one.len() < README_LIMIT, "{}", one.len());
+        let (width, height, _) = decode(&one);
+        assert_eq!(width, 1024);
+        assert!((300..700).contains(&height), "{height}");
+    }
+
+    #[test]
+    fn models_stand_on_white_in_their_colours() {
+        let (mesh, volume) = (shapes::octasphere([0.0; 3], 1.0, 24), ball(1.0, 16));
+        let (width, height, pixels) = decode(&both(&mesh, &volume, 400, 2));
+        let at = |x: usize, y: usize| pixels[y * width + x];
+        for y in 0..height {
+            assert_eq!([at(0, y), at(width - 1, y)], [WHITE; 2], "{y}");
+        }
+        assert!((0..width).all(|x| at(x, 0) == WHITE && at(x, height - 1) == WHITE));
+        let rows = height - LABEL_ROWS - FOOT_ROWS;
+        let [r, g, b] = at(100, rows / 2).map(i32::from);
+        assert!(
+            r >= b && r - b < 40 && g > 60 && r < 250,
+            "clay: {r} {g} {b}"
+        );
+        let [r, _, b] = at(300, rows / 2).map(i32::from);
+        assert!(b - r > 50, "blue: {r} {b}");
+        // The ball is lit from the upper left.
+        let left = i32::from(at(70, rows / 3)[1]);
+        let right = i32::from(at(135, rows * 3 / 4)[1]);
+        assert!(left > right + 40, "{left} {right}");
+        let ink = |x: std::ops::Range<usize>| {
+            let dark = |x: usize, y: usize| at(x, y).iter().all(|c| *c < 150);
+            (rows + 30..height).any(|y| x.clone().any(|x| dark(x, y)))
+        };
+        assert!(ink(20..200), "a caption on the left");
+        assert!(ink(300..380), "a scale bar on the right");
+    }
+
+    #[test]
+    fn nothing_and_hostile_things_are_drawn_without_a_fault() {
+        let params = Params {
+            width: 200,
+            up: Up::Z,
+        };
+        let flat = shapes::sheet(1.0, 1.0, 2, 2);
+        let speck = Mesh::from_triangles(vec![[1e9; 3]; 3], vec![[0, 1, 2]]);
+        let huge = shapes::cuboid([-1e300; 3], [1e300; 3]);
+        for mesh in [Mesh::default(), flat, speck, huge] {
+            let panel = Panel {
+                label: "",
+                what: What::Mesh(&mesh),
+                colour: colour::CLAY,
+            };
+            let (width, _, _) =
+                decode(&side_by_side(&[panel], "", "", &params).expect("a picture"));
+            assert_eq!(width, 200);
+        }
+        let (width, _, _) = decode(&side_by_side(&[], "none", "", &params).expect("a picture"));
+        assert_eq!(width, 200);
+    }
+
+    #[test]
+    fn round_lengths_are_round_and_not_above() {
+        for (most, length, name) in [
+            (1.0, 1.0, "1"),
+            (0.999, 0.5, "0.5"),
+            (47.0, 20.0, "20"),
+            (5000.0, 5000.0, "5000"),
+            (0.03, 0.02, "0.02"),
+            (3e-30, 2e-30, "2e-30"),
+            (9.9e30, 5e30, "5e30"),
+        ] {
+            let (found, written) = round_length(most);
+            assert!((found / length - 1.0).abs() < 1e-12, "{most}: {found}");
+            assert_eq!(written, name);
+        }
+        assert_eq!(round_length(f64::NAN).0, 0.0);
+        assert_eq!(round_length(0.0).0, 0.0);
+    }
+}

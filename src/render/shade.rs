@@ -16,9 +16,9 @@ use rayon::prelude::*;
 const AMBIENT_RADIUS: f32 = 0.5;
 
 /// Light of the lamp, of the sky above and of what the ground gives back.
-const KEY: Linear = [0.80, 0.765, 0.715];
-const SKY: Linear = [0.60, 0.625, 0.665];
-const BOUNCE: Linear = [0.36, 0.345, 0.325];
+const KEY: Linear = [1.02, 0.985, 0.93];
+const SKY: Linear = [0.46, 0.48, 0.51];
+const BOUNCE: Linear = [0.31, 0.30, 0.285];
 
 /// How dark the shadow on the ground is: under the model, and where the lamp is hidden.
 const CONTACT: f32 = 0.62;
@@ -61,6 +61,7 @@ pub fn render(subject: &Subject, camera: &Camera, size: Size, up: Vec3) -> Raste
     let buffer = rasterize(camera, fine, positions, triangles);
     let behind = |place| ground.behind(camera, place);
     let samples = Samples::new(buffer, camera, positions, triangles, behind);
+    let fade = |at: usize| ground.nearness(samples.place[at]) * edge_fade(at, fine);
     let light: Vec<[f32; 2]> = (0..samples.place.len())
         .into_par_iter()
         .map(|at| {
@@ -87,7 +88,7 @@ pub fn render(subject: &Subject, camera: &Camera, size: Size, up: Vec3) -> Raste
                     .map(|c| c * (1.0 - 0.42 * ink))
             } else {
                 let [hidden, lit] = light[at];
-                [shadow(hidden, lit) * edge_fade(at, fine) + 1.0 - edge_fade(at, fine); 3]
+                [mix(1.0, shadow(hidden, lit), fade(at)); 3]
             }
         })
         .collect();
@@ -115,22 +116,21 @@ fn rescaled(camera: &Camera, unit: f64) -> Camera {
 fn lamp_direction(camera: &Camera, up: Vec3) -> Vec3 {
     let right = normalize(cross(up, camera.axes[2]));
     let front = cross(right, up);
-    add(
-        scale(up, 0.98),
-        add(scale(right, -0.62), scale(front, 0.42)),
-    )
+    add(up, add(scale(right, -0.60), scale(front, 0.30)))
 }
 
 /// What of white the ground shows.
 fn shadow(hidden: f32, lit: f32) -> f32 {
-    (1.0 - CONTACT * hidden.powf(0.9)) * (1.0 - CAST * (1.0 - lit))
+    (1.0 - CONTACT * hidden.powf(1.15)) * (1.0 - CAST * (1.0 - lit))
 }
 
 /// 0 at the edge of the picture, 1 well inside: shadows never end at an edge.
 fn edge_fade(at: usize, size: Size) -> f32 {
-    let (x, y) = (at % size.width, at / size.width);
-    let near = x.min(y).min(size.width - 1 - x).min(size.height - 1 - y);
-    smoothstep(0.0, size.height as f32 * 0.06, near as f32)
+    let within = |at: usize, count: usize, share: f32| {
+        let near = at.min(count - 1 - at) as f32 / count as f32;
+        smoothstep(0.0, share, near)
+    };
+    within(at % size.width, size.width, 0.16) * within(at / size.width, size.height, 0.07)
 }
 
 /// The light that a material of one colour sends to the viewer.
@@ -195,4 +195,78 @@ fn edge_ink(subject: &Subject, camera: &Camera, samples: &Samples, at: usize) ->
     let readable = long_e.max(long_f) as f32 * 0.5;
     let strength = smoothstep(READABLE * 0.5, READABLE, readable);
     strength * (1.0 - smoothstep(0.4, 1.5, nearest))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::camera::THREE_QUARTER;
+    use crate::mesh::shapes;
+
+    const SIZE: Size = Size {
+        width: 90,
+        height: 80,
+    };
+    const UP: Vec3 = [0.0, 1.0, 0.0];
+
+    fn drawn(mesh: &crate::mesh::Mesh, lens: Option<f64>) -> Raster {
+        let framing = Camera::framing(&mesh.bounds(), THREE_QUARTER, UP, SIZE.aspect());
+        let eye = add(framing.target, scale(framing.axes[2], 4.0 * framing.unit));
+        let camera = lens.map_or(framing, |fov| Camera::look_at(eye, framing.target, UP, fov));
+        let subject = Subject {
+            positions: &mesh.positions,
+            triangles: &mesh.triangles,
+            colour: [0.5; 3],
+            squares: false,
+        };
+        render(&subject, &camera, SIZE, UP)
+    }
+
+    #[test]
+    fn the_size_of_a_model_changes_nothing() {
+        let base = shapes::torus_knot(2, 3, 0.4, 60, 20);
+        let wanted = drawn(&base, None);
+        for power in [-100, 100] {
+            let mut mesh = base.clone();
+            for p in &mut mesh.positions {
+                *p = p.map(|c| c * 2f64.powi(power));
+            }
+            assert_eq!(drawn(&mesh, None), wanted, "{power}");
+        }
+    }
+
+    #[test]
+    fn a_place_far_from_the_origin_changes_next_to_nothing() {
+        let base = shapes::torus_knot(2, 3, 0.4, 60, 20);
+        let mut mesh = base.clone();
+        for p in &mut mesh.positions {
+            *p = p.map(|c| c + 1e9);
+        }
+        let (near, far) = (drawn(&base, None), drawn(&mesh, None));
+        let apart = |(a, b): (&Linear, &Linear)| (a[1] - b[1]).abs();
+        let sum: f32 = near.pixels().iter().zip(far.pixels()).map(apart).sum();
+        assert!(sum / (near.pixels().len() as f32) < 2e-3, "{sum}");
+    }
+
+    #[test]
+    fn a_hollow_is_darker_than_a_top_under_either_lens() {
+        // Two balls that touch: the crease between them is in the shade of both.
+        let mesh = shapes::joined(
+            shapes::octasphere([-0.95, 0.0, 0.0], 1.0, 30),
+            &shapes::octasphere([0.95, 0.0, 0.0], 1.0, 30),
+        );
+        for lens in [None, Some(0.5)] {
+            let raster = drawn(&mesh, lens);
+            let light = |p: Vec3| {
+                let framing = Camera::framing(&mesh.bounds(), THREE_QUARTER, UP, SIZE.aspect());
+                let eye = add(framing.target, scale(framing.axes[2], 4.0 * framing.unit));
+                let camera =
+                    lens.map_or(framing, |fov| Camera::look_at(eye, framing.target, UP, fov));
+                let [x, y, _] = camera.to_screen(camera.to_view(p), SIZE);
+                raster.pixels()[y as usize * SIZE.width + x as usize][1]
+            };
+            let (crease, top) = (light([0.0, 0.1, 0.3]), light([-0.95, 0.9, 0.43]));
+            assert!(crease < 0.8 * top, "{crease} {top}");
+        }
+    }
 }
