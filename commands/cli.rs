@@ -117,7 +117,11 @@ mod tests {
     fn every_command_is_in_one_group_of_the_help() {
         let mut command = command();
         command.build();
-        let mut listed: Vec<&str> = GROUPS.iter().flat_map(|(_, names)| *names).copied().collect();
+        let mut listed: Vec<&str> = GROUPS
+            .iter()
+            .flat_map(|(_, names)| *names)
+            .copied()
+            .collect();
         let mut there: Vec<&str> = command
             .get_subcommands()
             .filter(|subcommand| !subcommand.is_hide_set())

@@ -63,7 +63,7 @@ pub struct Params {
 #[serde(tag = "kind", rename_all = "kebab-case")]
 pub enum Stats {
     /// Two meshes.
-    Mesh(MeshDifference),
+    Mesh(Box<MeshDifference>),
     /// Two volumes.
     Volume(VolumeDifference),
 }
@@ -108,7 +108,7 @@ fn meshes(
         difference.hausdorff, difference.hausdorff_bound, difference.rms
     );
     let accuracy = Measures::One(difference.accuracy());
-    Ok(Found::new(params, Stats::Mesh(difference), summary).accuracy(accuracy))
+    Ok(Found::new(params, Stats::Mesh(Box::new(difference)), summary).accuracy(accuracy))
 }
 
 fn volumes(job: &mut Job, a: &Volume, tolerance: Option<f64>) -> Result<Found<Params, Stats>> {

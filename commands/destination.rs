@@ -61,7 +61,9 @@ pub fn plan(
             path = Path::new(&path).join(file).display().to_string();
         }
         if let Some(other) = taken.insert(path.clone(), input) {
-            return Err(wrong(format!("{other} and {input} would both go to {path}")));
+            return Err(wrong(format!(
+                "{other} and {input} would both go to {path}"
+            )));
         }
         planned.push(Destination {
             sink: Sink::new(&path),
@@ -90,7 +92,10 @@ fn stem(input: &str) -> String {
         return "stdin".to_owned();
     }
     let mut name = PathBuf::from(Path::new(input).file_name().unwrap_or_default());
-    if name.extension().is_some_and(|e| e.eq_ignore_ascii_case("gz")) {
+    if name
+        .extension()
+        .is_some_and(|e| e.eq_ignore_ascii_case("gz"))
+    {
         name.set_extension("");
     }
     name.file_stem()

@@ -72,7 +72,10 @@ pub fn run(args: &Args) -> Result<Exit> {
 }
 
 fn table(formats: &[Row]) -> String {
-    let mut text = format!("{:<8} {:<7} {:<5} {:<6} about\n", "name", "kind", "read", "write");
+    let mut text = format!(
+        "{:<8} {:<7} {:<5} {:<6} about\n",
+        "name", "kind", "read", "write"
+    );
     let yes = |there| if there { "yes" } else { "-" };
     for row in formats {
         let (read, write) = (yes(row.read), yes(row.write));

@@ -39,7 +39,7 @@ pub struct Params {}
 #[serde(tag = "kind", rename_all = "kebab-case")]
 pub enum Stats {
     /// Triangles, polylines, points.
-    Mesh(Topology),
+    Mesh(Box<Topology>),
     /// Voxels.
     Volume(VolumeStats),
 }
@@ -83,7 +83,7 @@ fn look(job: &mut Job) -> Result<Found<Params, Stats>> {
             let topology = topology(&mesh, job.progress())?;
             job.warn(topology.warnings());
             summary += if topology.closed { ", closed" } else { "" };
-            Stats::Mesh(topology)
+            Stats::Mesh(Box::new(topology))
         }
         Content::Volume(volume) => {
             job.progress().stage("count", 0);

@@ -239,9 +239,7 @@ impl<'a> Job<'a> {
         let picture = draw(&self.recorder)?;
         self.recorder.stage("write", 0);
         place.prepare()?;
-        let output = place
-            .sink
-            .write_as("png", |out| out.write_all(&picture))?;
+        let output = place.sink.write_as("png", |out| out.write_all(&picture))?;
         self.written.push(output);
         Ok(())
     }

@@ -160,7 +160,9 @@ mod tests {
         assert_eq!(size("1.5 KiB"), Ok(1536));
         assert_eq!(size("1e9"), Ok(1_000_000_000));
         assert_eq!(size("7B"), Ok(7));
-        for wrong in ["", "GiB", "2G", "2gib", "-1", "0", "nan", "inf", "1e30", "ß"] {
+        for wrong in [
+            "", "GiB", "2G", "2gib", "-1", "0", "nan", "inf", "1e30", "ß",
+        ] {
             assert!(size(wrong).is_err(), "{wrong}");
         }
     }

@@ -23,7 +23,11 @@ fn a_write_that_fails_half_way_leaves_the_old_file_and_nothing_else() {
     let line = "trap '' XFSZ; ulimit -f 1; scantle convert fixtures/shapes/torus.obj -o old.ply";
     let ran = place.shell(line);
     assert_eq!(ran.code, 4, "{}", ran.stderr);
-    assert!(ran.stderr.contains("scantle: old.ply: cannot write: "), "{}", ran.stderr);
+    assert!(
+        ran.stderr.contains("scantle: old.ply: cannot write: "),
+        "{}",
+        ran.stderr
+    );
     assert_eq!(fs::read_to_string(place.path("old.ply")).unwrap(), "old");
     assert_eq!(place.names(), ["old.ply"]);
 }

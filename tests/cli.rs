@@ -66,7 +66,8 @@ fn exit_3_bad_input() {
     let ran = place.run("info missing.obj");
     assert_eq!(ran.code, 3);
     assert!(
-        ran.stderr.starts_with("scantle: missing.obj: cannot read: "),
+        ran.stderr
+            .starts_with("scantle: missing.obj: cannot read: "),
         "{}",
         ran.stderr
     );
@@ -83,7 +84,8 @@ fn exit_4_not_written() {
     let ran = place.run("convert fixtures/shapes/cube.obj -o missing/cube.ply");
     assert_eq!(ran.code, 4);
     assert!(
-        ran.stderr.starts_with("scantle: missing/cube.ply: cannot write: "),
+        ran.stderr
+            .starts_with("scantle: missing/cube.ply: cannot write: "),
         "{}",
         ran.stderr
     );
@@ -111,8 +113,16 @@ fn exit_5_over_a_limit() {
     let line = "info - --input-format obj --max-memory 100B";
     let ran = place.run_with_input(line, cube);
     assert_eq!(ran.code, 5, "{}", ran.stderr);
-    assert!(ran.stderr.contains("over the limit of 100 bytes"), "{}", ran.stderr);
-    assert!(ran.stderr.contains("\n  raise --max-memory"), "{}", ran.stderr);
+    assert!(
+        ran.stderr.contains("over the limit of 100 bytes"),
+        "{}",
+        ran.stderr
+    );
+    assert!(
+        ran.stderr.contains("\n  raise --max-memory"),
+        "{}",
+        ran.stderr
+    );
 }
 
 #[test]
@@ -160,11 +170,19 @@ fn several_inputs_make_a_line_each() {
 #[test]
 fn data_on_standard_output_leaves_no_room_for_the_report() {
     let place = Workplace::new();
-    assert_eq!(place.run("convert fixtures/shapes/cube.obj -o cube.ply").code, 0);
+    assert_eq!(
+        place
+            .run("convert fixtures/shapes/cube.obj -o cube.ply")
+            .code,
+        0
+    );
     let line = "convert fixtures/shapes/cube.obj -o - --output-format ply --report r.json";
     let ran = place.run(line);
     assert_eq!(ran.code, 0, "{}", ran.stderr);
-    assert_eq!(ran.stdout, fs::read(place.path("cube.ply")).expect("the file"));
+    assert_eq!(
+        ran.stdout,
+        fs::read(place.path("cube.ply")).expect("the file")
+    );
     let report = fs::read_to_string(place.path("r.json")).expect("the report");
     let report: serde_json::Value = serde_json::from_str(&report).expect("JSON");
     assert_eq!(report["output"][0]["path"], "-");
@@ -232,7 +250,11 @@ fn people_are_told_as_much_as_they_ask_for() {
     let place = Workplace::new();
     let normal = place.run("info fixtures/shapes/cube.obj");
     assert_eq!(normal.stderr.lines().count(), 1, "{}", normal.stderr);
-    assert!(normal.stderr.starts_with("scantle: fixtures/shapes/cube.obj: 8 vertices, "));
+    assert!(
+        normal
+            .stderr
+            .starts_with("scantle: fixtures/shapes/cube.obj: 8 vertices, ")
+    );
     let quiet = place.run("info fixtures/shapes/cube.obj --quiet");
     assert_eq!(quiet.stderr, "");
     let verbose = place.run("info fixtures/shapes/cube.obj --verbose");

@@ -93,7 +93,10 @@ fn the_help_of_each_command_ends_with_two_examples_that_run() {
         let examples: Vec<&str> = examples.trim_end().lines().map(str::trim).collect();
         assert_eq!(examples.len(), 2, "{command}: {examples:?}");
         for example in examples {
-            assert!(example.starts_with(&format!("scantle {command}")), "{example}");
+            assert!(
+                example.starts_with(&format!("scantle {command}")),
+                "{example}"
+            );
             let ran = Workplace::new().shell(example);
             assert_eq!(ran.code, 0, "{example}\n{}", ran.stderr);
         }

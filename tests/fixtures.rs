@@ -63,7 +63,11 @@ fn are_near(name: &str, a: Vec<u8>, b: Vec<u8>) -> bool {
     let (Some(a), Some(b)) = (mesh(a), mesh(b)) else {
         return false;
     };
-    let coordinates = a.positions.iter().flatten().zip(b.positions.iter().flatten());
+    let coordinates = a
+        .positions
+        .iter()
+        .flatten()
+        .zip(b.positions.iter().flatten());
     a.positions.len() == b.positions.len()
         && a.triangles == b.triangles
         && coordinates.into_iter().all(|(x, y)| (x - y).abs() < 1e-6)
@@ -76,7 +80,10 @@ fn made_fixtures_are_current() {
     let mut check = |name: &str, write: &dyn Fn(&Sink) -> scantle::error::Result<()>| {
         let fresh = place.path(&name.replace('/', "-"));
         write(&Sink::File(fresh.clone())).expect("a fixture is written");
-        let (fresh, kept) = (fs::read(fresh).expect("it"), root().join("fixtures").join(name));
+        let (fresh, kept) = (
+            fs::read(fresh).expect("it"),
+            root().join("fixtures").join(name),
+        );
         if updating("UPDATE_FIXTURES") {
             fs::create_dir_all(kept.parent().expect("a folder")).expect("a folder");
             fs::write(kept, fresh).expect("a fixture is written");

@@ -53,9 +53,14 @@ fn violation(
     line: &str,
     report: &Value,
 ) -> Option<String> {
-    let command = line.split_whitespace().next().expect("a line names a command");
+    let command = line
+        .split_whitespace()
+        .next()
+        .expect("a line names a command");
     let schema = schemas.entry(command.to_owned()).or_insert_with(|| {
-        let schema = Workplace::new().run(&format!("schema {command}")).document();
+        let schema = Workplace::new()
+            .run(&format!("schema {command}"))
+            .document();
         jsonschema::validator_for(&schema).expect("a schema")
     });
     let error = schema.validate(report).err()?;
@@ -70,7 +75,10 @@ fn differences(case: &Path, ran: &Ran) -> Vec<String> {
     let mut found = Vec::new();
     let code: i32 = kept(case, "code").trim().parse().unwrap_or(0);
     if code != ran.code {
-        found.push(format!("exit code {code} became {}\n{}", ran.code, ran.stderr));
+        found.push(format!(
+            "exit code {code} became {}\n{}",
+            ran.code, ran.stderr
+        ));
     }
     if code != 0 && kept(case, "stderr") != ran.stderr {
         let (want, got) = (kept(case, "stderr"), &ran.stderr);

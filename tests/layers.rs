@@ -145,7 +145,9 @@ fn violations(path: &Path, text: &str) -> Vec<String> {
     if climbs_to_the_root(&code, parts.len()) {
         found.push("super:: leads out of the module; write crate::".to_owned());
     }
-    let terminal = NOT_IN_THE_LIBRARY.iter().filter(|word| code.contains(**word));
+    let terminal = NOT_IN_THE_LIBRARY
+        .iter()
+        .filter(|word| code.contains(**word));
     found.extend(terminal.map(|word| format!("{word} belongs to commands/")));
     if module != "io" {
         let files = ONLY_IN_IO.iter().filter(|word| code.contains(**word));
@@ -163,7 +165,11 @@ fn imports_point_down_only() {
         if path != Path::new("lib.rs") {
             let text = fs::read_to_string(&file).expect("a source file");
             let found = violations(path, &text);
-            wrong.extend(found.iter().map(|why| format!("src/{}: {why}", path.display())));
+            wrong.extend(
+                found
+                    .iter()
+                    .map(|why| format!("src/{}: {why}", path.display())),
+            );
         }
     }
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));

@@ -32,10 +32,17 @@ fn messages(name: &str, expected: &str) -> [String; 2] {
 fn malformed_files_are_refused_with_words() {
     let mut wrong = Vec::new();
     for file in files_below(&root().join("fixtures/malformed")) {
-        if file.extension().is_some_and(|e| ["expected", "md", "py"].iter().any(|other| e == *other)) {
+        if file
+            .extension()
+            .is_some_and(|e| ["expected", "md", "py"].iter().any(|other| e == *other))
+        {
             continue;
         }
-        let name = file.strip_prefix(root()).expect("a fixture").display().to_string();
+        let name = file
+            .strip_prefix(root())
+            .expect("a fixture")
+            .display()
+            .to_string();
         let place = Workplace::new();
         let ran = place.run(&format!("info {name}"));
         if updating("UPDATE_GOLDEN") {

@@ -114,6 +114,8 @@ macro_rules! with_samples {
             $crate::volume::Data::U64($v) => $numbers,
             $crate::volume::Data::I64($v) => $numbers,
             $crate::volume::Data::F32($v) => $numbers,
+            // What is a conversion for the others is none here.
+            #[allow(clippy::unnecessary_cast)]
             $crate::volume::Data::F64($v) => $numbers,
             $b => $bits,
         }

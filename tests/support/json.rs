@@ -19,7 +19,9 @@ pub fn differences(want: &Value, got: &Value) -> Vec<String> {
 
 fn compare(at: &str, want: &Value, got: &Value, found: &mut Vec<String>) {
     match (want, got) {
-        (Value::Object(a), Value::Object(b)) if a.len() == b.len() && a.keys().all(|key| b.contains_key(key)) => {
+        (Value::Object(a), Value::Object(b))
+            if a.len() == b.len() && a.keys().all(|key| b.contains_key(key)) =>
+        {
             for (key, value) in a {
                 compare(&format!("{at}/{key}"), value, &b[key], found);
             }
