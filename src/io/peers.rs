@@ -5,9 +5,11 @@ use super::sink::Sink;
 use super::source::Source;
 use crate::mesh::Mesh;
 use crate::volume::bits::BitGrid;
+use crate::volume::octree::Octree;
 use crate::volume::{Data, Frame, Volume};
 use serde_json::json;
 use std::fs;
+use std::io::{self, Write};
 use std::path::Path;
 
 /// A frame whose axes are turned about z by the angle of 3-4-5.
@@ -129,4 +131,49 @@ fn write_files_for_peers() {
     let sink = Sink::File(folder.join("tetrahedron.glb"));
     let (outputs, _) = super::write_mesh(&mesh, &sink, Format::Glb).unwrap();
     assert!(outputs[0].bytes > 0);
+}
+
+/// Bits are written the same whether they are stored densely or sparsely.
+#[test]
+fn sparse_and_dense_volumes_are_written_alike() {
+    let solid = |dims: [usize; 3]| {
+        let mut volume = shape(Frame::straight(dims, [0.0; 3], [0.5; 3]));
+        if let Data::Bits(grid) = &mut volume.data {
+            for z in dims[2] / 4..dims[2] {
+                for y in 0..dims[1] {
+                    grid.set_run(dims[0] / 3, dims[0], y, z);
+                }
+            }
+        }
+        volume
+    };
+    for dims in [
+        [130, 45, 71],
+        [37, 37, 37],
+        [144, 144, 144],
+        [257, 131, 190],
+    ] {
+        let dense = solid(dims);
+        let Data::Bits(grid) = &dense.data else {
+            panic!("the shape is made of bits");
+        };
+        let sparse = Volume {
+            frame: dense.frame,
+            data: Data::Sparse(Octree::from_bits(grid)),
+        };
+        let writers: [fn(&Volume, &mut dyn Write) -> io::Result<()>; 6] = [
+            super::nrrd::write,
+            super::metaimage::write,
+            super::npy::write,
+            super::vti::write,
+            super::vdb::write,
+            super::binvox::write,
+        ];
+        for (index, writer) in writers.into_iter().enumerate() {
+            let (mut a, mut b) = (Vec::new(), Vec::new());
+            writer(&dense, &mut a).unwrap();
+            writer(&sparse, &mut b).unwrap();
+            assert!(a == b, "writer {index} of a grid of {dims:?}");
+        }
+    }
 }
