@@ -2,7 +2,7 @@
 
 use crate::exit::Exit;
 use crate::streams::say;
-use crate::{compare, completions, convert, formats, info, man, schema};
+use crate::{compare, completions, convert, formats, info, man, schema, voxelize};
 use clap::error::ErrorKind;
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 use std::fmt::Write;
@@ -21,6 +21,7 @@ struct Cli {
 /// The commands.
 #[derive(Debug, Subcommand)]
 pub enum Command {
+    Voxelize(Box<voxelize::Args>),
     Info(info::Args),
     Compare(compare::Args),
     Convert(convert::Args),
@@ -32,6 +33,7 @@ pub enum Command {
 
 /// The commands by what goes in and what comes out, as the help shows them.
 const GROUPS: &[(&str, &[&str])] = &[
+    ("Mesh to volume", &["voxelize"]),
     ("Any file", &["info", "convert", "compare"]),
     (
         "About scantle",

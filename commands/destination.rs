@@ -87,7 +87,7 @@ fn check_placeholders(word: &str) -> Result<(), String> {
 }
 
 /// The name of an input without folder, `.gz` and extension; `stdin` for standard input.
-fn stem(input: &str) -> String {
+pub fn stem(input: &str) -> String {
     if input == "-" {
         return "stdin".to_owned();
     }

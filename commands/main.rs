@@ -21,6 +21,7 @@ mod formats;
 mod info;
 mod man;
 mod schema;
+mod voxelize;
 
 use cli::Command;
 use std::process::ExitCode;
@@ -31,6 +32,7 @@ fn main() -> ExitCode {
         Err(exit) => return exit.into(),
     };
     let ended = match &command {
+        Command::Voxelize(args) => voxelize::run(args),
         Command::Info(args) => info::run(args),
         Command::Compare(args) => compare::run(args),
         Command::Convert(args) => convert::run(args),

@@ -115,6 +115,22 @@ fn one_of(formats: impl Iterator<Item = Format>) -> impl TypedValueParser<Value 
         .map(|name| Format::from_name(&name).expect("the parser knows only names of formats"))
 }
 
+/// One of a list of names, as the value that it stands for.
+pub fn named<T: Clone + Send + Sync + 'static>(
+    names: &'static [&'static str],
+    value: fn(&str) -> Option<T>,
+) -> impl TypedValueParser<Value = T> {
+    PossibleValuesParser::new(names).try_map(move |name| value(&name).ok_or("not a name in the list"))
+}
+
+/// `N` finite numbers with commas between them.
+pub fn list<const N: usize>(text: &str) -> Result<[f64; N], String> {
+    let numbers: Result<Vec<f64>, _> = text.split(',').map(|word| word.trim().parse()).collect();
+    let numbers = numbers.map_err(|_| "has something that is no number".to_owned())?;
+    let count = numbers.len();
+    numbers.try_into().map_err(|_| format!("has {count} numbers, not {N}"))
+}
+
 /// A finite number that is 0 or more.
 pub fn not_negative(text: &str) -> Result<f64, String> {
     let number: f64 = text.parse().map_err(|_| "not a number".to_owned())?;
@@ -165,6 +181,13 @@ mod tests {
         ] {
             assert!(size(wrong).is_err(), "{wrong}");
         }
+    }
+
+    #[test]
+    fn lists_have_their_length() {
+        assert_eq!(list::<3>("1,-2.5, 4e1"), Ok([1.0, -2.5, 40.0]));
+        assert_eq!(list::<2>("1,2,3"), Err("has 3 numbers, not 2".to_owned()));
+        assert!(list::<2>("1,x").is_err());
     }
 
     #[test]

@@ -1,11 +1,12 @@
 //! `scantle voxelize`: a mesh becomes voxels.
 
 use crate::context::{Context, Files};
+use crate::destination::stem;
 use crate::exit::Exit;
 use crate::job::{Found, Job};
 use crate::shared::{Common, Inputs, MaxError, Output, Preview, Verify, list, named};
 use scantle::error::Result;
-use scantle::image::colour::{CLAY, SKY_BLUE};
+use scantle::image::colour::{CLAY, OKABE_ITO};
 use scantle::io::format::Kind;
 use scantle::measure::voxel_error::{self, VoxelError};
 use scantle::mesh::Mesh;
@@ -142,8 +143,8 @@ fn voxelize(job: &mut Job, params: &Params, args: &Args) -> Result<Found<Params,
     }
     let [nx, ny, nz] = made.dims;
     let summary = format!("{} of {nx} x {ny} x {nz} voxels set", made.set_voxels);
-    let name = job.stem();
-    job.write_preview(|_| picture(&name, &mesh, &volume, &made, &accuracy[0].clone()))?;
+    let name = job.input().map(|input| stem(&input.path)).unwrap_or_default();
+    job.write_preview(|_| picture(&name, &mesh, &volume, &made, &accuracy[0]))?;
     let modelled = made.modelled();
     let found = Found::new(params.clone(), Stats { made, verified }, summary);
     Ok(found.accuracy(Measures::Many(accuracy)).modelled(modelled).check("max-error", args.max_error.max_error))
@@ -161,7 +162,7 @@ fn picture(
     let label = format!("{nx} × {ny} × {nz} voxels, {}", made.mode.name());
     let panels = [
         Panel { label: name, what: What::Mesh(mesh), colour: CLAY },
-        Panel { label: &label, what: What::Voxels(volume), colour: SKY_BLUE },
+        Panel { label: &label, what: What::Voxels(volume), colour: OKABE_ITO[2] },
     ];
     let (sign, amount) = match (error.reached, error.bound) {
         (Some(reached), _) => ("=", reached),
