@@ -18,6 +18,9 @@ const SOFTNESS: f32 = 0.13;
 const SEARCH: usize = 10;
 const WEIGH: usize = 12;
 
+/// Ways that the samples are turned, one for each place in a tile.
+const TURNS: usize = 16;
+
 /// A lamp and the depth of what it sees first.
 pub(super) struct KeyLight {
     /// From the model to the lamp, in the view space of the picture.
@@ -27,6 +30,8 @@ pub(super) struct KeyLight {
     /// Distance from the lamp's plane of each texel, infinite where nothing is.
     map: Vec<f32>,
     distance: f32,
+    /// For each offset, places in a disc of radius 1: those to search, then those to weigh.
+    discs: [[[f32; 2]; SEARCH + WEIGH]; TURNS],
 }
 
 impl KeyLight {
@@ -51,10 +56,18 @@ impl KeyLight {
             shift: shift.map(|c| c as f32),
             map: rasterize(&lamp, size, positions, triangles).depth,
             distance: lamp.distance as f32,
+            discs: std::array::from_fn(|turn| {
+                let offset = turn as f32 / TURNS as f32;
+                std::array::from_fn(|i| match i.checked_sub(SEARCH) {
+                    None => on_disc(i, SEARCH, offset),
+                    Some(i) => on_disc(i, WEIGH, offset),
+                })
+            }),
         }
     }
 
-    /// The share of the lamp that a place with a normal sees, 0 to 1. `offset` turns the samples.
+    /// The share of the lamp that a place with a normal sees, 0 to 1. `offset`, from 0
+    /// to 15/16, turns the samples.
     ///
     /// The further away what stands in the way, the wider the edge of its shadow.
     ///
@@ -73,17 +86,16 @@ impl KeyLight {
         let lean = [n[0] / n[2].max(0.1), n[1] / n[2].max(0.1)];
         let steep = (lean[0] * lean[0] + lean[1] * lean[1]).sqrt();
         let bias = (1.5 + 1.5 * steep.min(6.0)) / TEXELS;
-        let blocker = |i: usize, of: usize, radius: f32| {
-            // Vogel's disc: evenly spread, each turned by the golden angle.
-            let r = ((i as f32 + 0.5) / of as f32).sqrt() * radius;
-            let (sin, cos) = (i as f32 * 2.399_963 + offset * std::f32::consts::TAU).sin_cos();
-            let (du, dv) = (r * cos, r * sin);
+        let disc = &self.discs[(offset * TURNS as f32) as usize % TURNS];
+        let blocker = |at: &[f32; 2], radius: f32| {
+            let (du, dv) = (at[0] * radius, at[1] * radius);
             let plane = depth + (lean[0] * du + lean[1] * dv).clamp(-0.2, 0.2);
             let found = self.texel(middle[0] + du * TEXELS, middle[1] - dv * TEXELS);
-            (found < plane - bias - 0.02 * r).then_some(plane - found)
+            (found < plane - bias - 0.012 * radius).then_some(plane - found)
         };
         let (mut gap, mut count) = (0.0, 0.0);
-        for way in (0..SEARCH).filter_map(|i| blocker(i, SEARCH, SOFTNESS * 0.8)) {
+        let (search, weigh) = disc.split_at(SEARCH);
+        for way in search.iter().filter_map(|at| blocker(at, SOFTNESS * 0.8)) {
             gap += way;
             count += 1.0;
         }
@@ -91,8 +103,9 @@ impl KeyLight {
             return 1.0;
         }
         let radius = (SOFTNESS * gap / count).clamp(2.5 / TEXELS, SOFTNESS * 1.2);
-        let hidden = (0..WEIGH)
-            .filter(|i| blocker(*i, WEIGH, radius).is_some())
+        let hidden = weigh
+            .iter()
+            .filter(|at| blocker(at, radius).is_some())
             .count();
         1.0 - hidden as f32 / WEIGH as f32
     }
@@ -104,4 +117,11 @@ impl KeyLight {
         }
         self.map[y as usize * MAP + x as usize]
     }
+}
+
+/// Place `i` of some that cover a disc evenly: each is turned on by the golden angle (Vogel 1979).
+fn on_disc(i: usize, of: usize, offset: f32) -> [f32; 2] {
+    let radius = ((i as f32 + 0.5) / of as f32).sqrt();
+    let (sin, cos) = (i as f32 * 2.399_963 + offset * std::f32::consts::TAU).sin_cos();
+    [radius * cos, radius * sin]
 }

@@ -9,10 +9,10 @@ use std::f32::consts::{FRAC_PI_2, PI};
 
 /// Planes through the viewing axis that each sample looks along; the 4 x 4 samples of a tile look
 /// along different ones.
-const SLICES: usize = 2;
+const SLICES: usize = 1;
 
 /// Places looked at on either side in each plane.
-const STEPS: usize = 8;
+const STEPS: usize = 9;
 
 /// The samples of a picture in view space.
 pub(super) struct Samples {
@@ -101,9 +101,11 @@ impl Samples {
             let length = dot(in_plane, in_plane).sqrt().max(1e-6);
             let cos_n = (dot(in_plane, viewer) / length).clamp(-1.0, 1.0);
             let tilt = cos_n.acos() * dot(along, in_plane).signum();
+            let sin_n = tilt.sin();
             let mut horizon = [0.0; 2];
             for (side, sign) in [1.0, -1.0f32].into_iter().enumerate() {
-                let low = (tilt + sign * FRAC_PI_2).cos();
+                // The cosine of the tilt and a right angle more or less.
+                let low = -sign * sin_n;
                 let mut highest = low;
                 for step in 0..STEPS {
                     let far = (step as f32 + jitter) / STEPS as f32;
@@ -122,7 +124,7 @@ impl Samples {
             }
             for h in horizon {
                 let h = tilt + (h - tilt).clamp(-FRAC_PI_2, FRAC_PI_2);
-                let arc = cos_n + 2.0 * h * tilt.sin() - (2.0 * h - tilt).cos();
+                let arc = cos_n + 2.0 * h * sin_n - (2.0 * h - tilt).cos();
                 open += length * arc * 0.25;
             }
         }
