@@ -27,6 +27,9 @@ const MESHES: &[Row<Mesh>] = &[
     ("shapes/torus.obj", || {
         shapes::torus([0.0; 3], 1.0, 0.25, 48, 16)
     }),
+    ("shapes/torus-knot.ply", || {
+        shapes::torus_knot(2, 3, 0.4, 160, 24)
+    }),
 ];
 
 const VOLUMES: &[Row<Volume>] = &[
