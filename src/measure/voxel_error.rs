@@ -70,12 +70,25 @@ pub fn measure(
     progress: &dyn Progress,
 ) -> Result<VoxelError> {
     let again = |mode: Mode, fill: Fill| {
-        let grid = if matches!(made.data, Data::Sparse(_)) { Storage::Sparse } else { Storage::Dense };
-        let params = voxelize::Params { mode, fill, grid, ..params.clone() };
-        voxelize::voxelize(mesh, &params, &crate::progress::Silent).map(|(volume, stats)| (volume, stats))
+        let grid = if matches!(made.data, Data::Sparse(_)) {
+            Storage::Sparse
+        } else {
+            Storage::Dense
+        };
+        let params = voxelize::Params {
+            mode,
+            fill,
+            grid,
+            ..params.clone()
+        };
+        voxelize::voxelize(mesh, &params, &crate::progress::Silent)
+            .map(|(volume, stats)| (volume, stats))
     };
     progress.stage("verify", 0);
-    let (conservative, three_axis) = (again(Mode::Conservative, Fill::None)?.0, again(Mode::ThreeAxis, Fill::None)?.0);
+    let (conservative, three_axis) = (
+        again(Mode::Conservative, Fill::None)?.0,
+        again(Mode::ThreeAxis, Fill::None)?.0,
+    );
     let surface_only = match params.mode {
         Mode::Conservative | Mode::None => None,
         mode => Some(again(mode, Fill::None)?.0),
@@ -90,7 +103,11 @@ pub fn measure(
         fill => Some(again(Mode::None, fill)?.0),
     };
     let grid_mesh = Mesh {
-        positions: mesh.positions.par_iter().map(|p| lattice.to_grid(*p)).collect(),
+        positions: mesh
+            .positions
+            .par_iter()
+            .map(|p| lattice.to_grid(*p))
+            .collect(),
         triangles: mesh.triangles.clone(),
         segments: mesh.segments.clone(),
         points: mesh.points.clone(),
@@ -106,7 +123,9 @@ pub fn measure(
     let leaks = if inside_grid && !mesh.triangles.is_empty() {
         let (inside, stats) = again(Mode::None, Fill::Winding)?;
         let closed = stats.border_edges == Some(0);
-        by_rule.filter(|_| closed).map(|surface| leaks(surface, &inside))
+        by_rule
+            .filter(|_| closed)
+            .map(|surface| leaks(surface, &inside))
     } else {
         None
     };
@@ -136,7 +155,11 @@ impl VoxelError {
         }
         let closed = self.leaks.is_some();
         let conservative = bounds.get(1).is_some_and(|b| b.bound == Some(0.0));
-        let mut count = |measure: &str, unit: &str, bound: Option<f64>, reached: Option<u64>, reference: &str| {
+        let mut count = |measure: &str,
+                         unit: &str,
+                         bound: Option<f64>,
+                         reached: Option<u64>,
+                         reference: &str| {
             bounds.push(Accuracy {
                 measure: measure.to_owned(),
                 unit: unit.to_owned(),
@@ -148,10 +171,28 @@ impl VoxelError {
         };
         let exact = "exact closed triangle-box test";
         let missed = Some(self.missed_triangles);
-        count("triangles none of whose voxels is set", "triangle", conservative.then_some(0.0), missed, exact);
+        count(
+            "triangles none of whose voxels is set",
+            "triangle",
+            conservative.then_some(0.0),
+            missed,
+            exact,
+        );
         let flood = "flood fill from outside against winding number";
-        count("voxels inside that a flood from outside reaches", "voxel", closed.then_some(0.0), self.leaks, flood);
-        count("voxels that the surface does not touch", "voxel", Some(0.0), Some(self.not_conservative), exact);
+        count(
+            "voxels inside that a flood from outside reaches",
+            "voxel",
+            closed.then_some(0.0),
+            self.leaks,
+            flood,
+        );
+        count(
+            "voxels that the surface does not touch",
+            "voxel",
+            Some(0.0),
+            Some(self.not_conservative),
+            exact,
+        );
         bounds
     }
 }
@@ -221,15 +262,22 @@ fn from_surface(mesh: &Mesh, made: &Volume, dims: [usize; 3]) -> (Option<f64>, u
                 }
                 samples += 1;
                 // Looking only for what is nearer than needed settles most samples at the root.
-                let found = bvh.nearest(p, f64::INFINITY, |i| cells[i as usize].distance_squared(p));
+                let found =
+                    bvh.nearest(p, f64::INFINITY, |i| cells[i as usize].distance_squared(p));
                 worst = worst.max(found.map_or(0.0, |n| n.distance_squared.sqrt()));
             });
         }
         (worst, samples)
     };
-    let parts: Vec<(f64, u64)> = (0..count.div_ceil(CHUNK)).into_par_iter().map(of_chunk).collect();
+    let parts: Vec<(f64, u64)> = (0..count.div_ceil(CHUNK))
+        .into_par_iter()
+        .map(of_chunk)
+        .collect();
     let worst = parts.iter().fold(0.0f64, |m, p| m.max(p.0));
-    (Some(if worst <= SAMPLE_ROUNDING { 0.0 } else { worst }), parts.iter().map(|p| p.1).sum())
+    (
+        Some(if worst <= SAMPLE_ROUNDING { 0.0 } else { worst }),
+        parts.iter().map(|p| p.1).sum(),
+    )
 }
 
 /// The closed boxes of the set voxels, runs along x joined.
@@ -242,7 +290,10 @@ fn cells(made: &Volume) -> Vec<Aabb> {
         for y in 0..ny {
             for (x0, x1) in runs(slice.row(y, 0), nx, true) {
                 let lo = [x0 as f64, y as f64, z as f64];
-                found.push(Aabb { lo, hi: [x1 as f64, lo[1] + 1.0, lo[2] + 1.0] });
+                found.push(Aabb {
+                    lo,
+                    hi: [x1 as f64, lo[1] + 1.0, lo[2] + 1.0],
+                });
             }
         }
     }
@@ -266,7 +317,11 @@ fn runs(row: &[u64], nx: usize, set: bool) -> Vec<(u32, u32)> {
                 Some(run) => run.1 = x1,
                 None => found.push((x0, x1)),
             }
-            rest = if start + length >= 64 { 0 } else { rest & u64::MAX << (start + length) };
+            rest = if start + length >= 64 {
+                0
+            } else {
+                rest & u64::MAX << (start + length)
+            };
         }
     }
     found
@@ -280,7 +335,10 @@ fn for_each_sample(corners: [Vec3; 3], f: &mut impl FnMut(Vec3)) {
     let steps = (longest / SAMPLING).ceil().clamp(1.0, 1e6) as u32;
     for i in 0..=steps {
         for j in 0..=steps - i {
-            let (s, t) = (f64::from(i) / f64::from(steps), f64::from(j) / f64::from(steps));
+            let (s, t) = (
+                f64::from(i) / f64::from(steps),
+                f64::from(j) / f64::from(steps),
+            );
             f(add(a, add(scale(u, s), scale(v, t))));
         }
     }
@@ -306,7 +364,9 @@ fn missed(mesh: &Mesh, made: &Volume, dims: [usize; 3]) -> (u64, f64) {
             (missed, area, all)
         })
         .collect();
-    let (missed, area, all) = parts.iter().fold((0, 0.0, 0.0), |s, p| (s.0 + p.0, s.1 + p.1, s.2 + p.2));
+    let (missed, area, all) = parts
+        .iter()
+        .fold((0, 0.0, 0.0), |s, p| (s.0 + p.0, s.1 + p.1, s.2 + p.2));
     (missed, if all > 0.0 { area / all } else { 0.0 })
 }
 
@@ -317,7 +377,10 @@ fn has_set_voxel(corners: &[Vec3; 3], held: &Held, dims: [usize; 3]) -> bool {
         return true;
     }
     let range: [(i32, i32); 3] = std::array::from_fn(|a| {
-        ((bounds.lo[a].ceil() as i32 - 1).max(0), (bounds.hi[a].floor() as i32).min(dims[a] as i32 - 1))
+        (
+            (bounds.lo[a].ceil() as i32 - 1).max(0),
+            (bounds.hi[a].floor() as i32).min(dims[a] as i32 - 1),
+        )
     });
     let mut touched = false;
     for z in range[2].0..=range[2].1 {
@@ -369,7 +432,12 @@ fn outside_of(a: &Volume, b: &Volume) -> u64 {
     for z in 0..nz {
         a.read_bit_slices(z, &mut of_a);
         b.read_bit_slices(z, &mut of_b);
-        count += of_a.words().iter().zip(of_b.words()).map(|(a, b)| u64::from((a & !b).count_ones())).sum::<u64>();
+        count += of_a
+            .words()
+            .iter()
+            .zip(of_b.words())
+            .map(|(a, b)| u64::from((a & !b).count_ones()))
+            .sum::<u64>();
     }
     count
 }
@@ -393,12 +461,21 @@ fn leaks(surface: &Volume, inside: &Volume) -> u64 {
             let first = sets.len() as u32;
             sets.extend(first..first + free.len() as u32);
             for (i, run) in free.iter().enumerate() {
-                if run.0 == 0 || run.1 as usize == nx || y == 0 || z == 0 || y + 1 == ny || z + 1 == nz {
+                if run.0 == 0
+                    || run.1 as usize == nx
+                    || y == 0
+                    || z == 0
+                    || y + 1 == ny
+                    || z + 1 == nz
+                {
                     join(&mut sets, 0, first + i as u32);
                 }
             }
             let row = z * ny + y;
-            for before in [(y > 0).then(|| row - 1), (z > 0).then(|| row - ny)].into_iter().flatten() {
+            for before in [(y > 0).then(|| row - 1), (z > 0).then(|| row - ny)]
+                .into_iter()
+                .flatten()
+            {
                 let (mut i, mut j) = (0, 0);
                 while i < free.len() && j < rows[before].len() {
                     let (a, b) = (free[i], rows[before][j]);
@@ -423,7 +500,9 @@ fn leaks(surface: &Volume, inside: &Volume) -> u64 {
             let row = z * ny + y;
             for (i, run) in rows[row].iter().enumerate() {
                 if find(&mut sets, firsts[row] + i as u32) == 0 {
-                    leaks += (run.0..run.1).filter(|x| slice.get(*x as usize, y, 0)).count() as u64;
+                    leaks += (run.0..run.1)
+                        .filter(|x| slice.get(*x as usize, y, 0))
+                        .count() as u64;
                 }
             }
         }

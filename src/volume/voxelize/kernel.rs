@@ -12,6 +12,7 @@
 //!   share an edge, for inside and outside.
 
 use super::span::{Edges, Plane, Sample, Span, ceil, floor, side};
+use super::{octants, small};
 use crate::numeric::predicates::{orient2d, orient3d};
 use crate::numeric::vector::{Vec3, cross, sub};
 
@@ -44,12 +45,25 @@ fn pick(q: &Triangle, u: usize, v: usize) -> [[f64; 2]; 3] {
     [[q[0][u], q[0][v]], [q[1][u], q[1][v]], [q[2][u], q[2][v]]]
 }
 
-fn least(q: &Triangle, a: usize) -> f64 {
-    q[0][a].min(q[1][a]).min(q[2][a])
+/// The smaller number; unlike `f64::min` it need not care for NaN.
+#[inline(always)]
+fn min(a: f64, b: f64) -> f64 {
+    if a < b { a } else { b }
 }
 
+#[inline(always)]
+fn max(a: f64, b: f64) -> f64 {
+    if a > b { a } else { b }
+}
+
+#[inline(always)]
+fn least(q: &Triangle, a: usize) -> f64 {
+    min(min(q[0][a], q[1][a]), q[2][a])
+}
+
+#[inline(always)]
 fn greatest(q: &Triangle, a: usize) -> f64 {
-    q[0][a].max(q[1][a]).max(q[2][a])
+    max(max(q[0][a], q[1][a]), q[2][a])
 }
 
 /// The triangle relative to a corner of the grid, its normal, and a bound on all coordinates of
@@ -105,14 +119,22 @@ pub fn overlap(
     emit: &mut impl FnMut(i32, i32, i32, i32),
 ) {
     let mut range = [(0, 0); 3];
-    let mut several = 0;
+    let (mut several, mut longest, mut clipped) = (0, 0, false);
     for a in 0..3 {
         let (first, last) = (ceil(least(q, a)) - 1, floor(greatest(q, a)));
         range[a] = (first.max(clip.lo[a]), last.min(clip.hi[a]));
-        if range[a].0 > range[a].1 {
-            return;
-        }
         several |= usize::from(first < last) << a;
+        longest = longest.max(last - first);
+        clipped |= range[a] != (first, last);
+    }
+    if !clipped && longest == 1 {
+        let base = range.map(|r| r.0);
+        if let Some(mask) = octants::touched(q, base.map(|c| f64::from(c + 1))) {
+            return pairs(mask, base, emit);
+        }
+    }
+    if clipped && range.iter().any(|r| r.0 > r.1) {
+        return;
     }
     let [x, y, z] = range;
     // A connected set inside a slab one cell thick meets a cell exactly where its projection does,
@@ -124,6 +146,9 @@ pub fn overlap(
             }
         }
         return;
+    }
+    if !clipped && longest < small::EDGE {
+        return few(q, range, several, emit);
     }
     let local = Local::new(q, range);
     if local.reach > LARGE {
@@ -216,6 +241,67 @@ pub fn overlap(
                 }
             }
         }
+    }
+}
+
+/// Emits the voxels of a mask of octants, whose lowest voxel is `base`.
+#[inline(always)]
+fn pairs(mask: u8, base: [i32; 3], emit: &mut impl FnMut(i32, i32, i32, i32)) {
+    for row in 0..4 {
+        let pair = i32::from(mask) >> (2 * row) & 3;
+        if pair != 0 {
+            emit(
+                base[0] + (pair == 2) as i32,
+                base[0] + (pair >> 1),
+                base[1] + (row & 1),
+                base[2] + (row >> 1),
+            );
+        }
+    }
+}
+
+/// [`overlap`] for a triangle that spans few voxels, all of them within the clip.
+#[inline]
+fn few(
+    q: &Triangle,
+    range: [(i32, i32); 3],
+    several: usize,
+    emit: &mut impl FnMut(i32, i32, i32, i32),
+) {
+    let base = range.map(|r| r.0);
+    let cells = small::touched(q, base, range.map(|r| r.1 - r.0 + 1), several);
+    let mut open = cells.possible & !cells.certain;
+    let mut set = cells.certain;
+    while open != 0 {
+        let bit = open.trailing_zeros() as i32;
+        if touches(
+            q,
+            [
+                base[0] + (bit & 3),
+                base[1] + (bit >> 2 & 3),
+                base[2] + (bit >> 4),
+            ],
+            1,
+        ) {
+            set |= 1 << bit;
+        }
+        open &= open - 1;
+    }
+    // What a convex set touches of a row is one run.
+    while set != 0 {
+        let row = set.trailing_zeros() as i32 >> 2;
+        let cells = (set >> (4 * row) & 0xf) as u32;
+        let (first, last) = (
+            cells.trailing_zeros() as i32,
+            31 - cells.leading_zeros() as i32,
+        );
+        emit(
+            base[0] + first,
+            base[0] + last,
+            base[1] + (row & 3),
+            base[2] + (row >> 2),
+        );
+        set &= !(0xf << (4 * row));
     }
 }
 
@@ -322,10 +408,17 @@ pub fn touches(q: &Triangle, at: [i32; 3], edge: i32) -> bool {
 }
 
 /// Whether all three projections of the triangle have no area: its corners lie on one line.
-pub fn is_degenerate(q: &Triangle) -> bool {
-    let n = cross(sub(q[1], q[0]), sub(q[2], q[0]));
-    let size = q.iter().flatten().fold(0.0f64, |m, c| m.max(c.abs()));
-    (0..3).all(|axis| side(n[axis], size, pick(q, (axis + 1) % 3, (axis + 2) % 3)) == 0)
+/// `reach` bounds all its coordinates.
+#[inline(always)]
+pub fn is_degenerate(q: &Triangle, reach: f64) -> bool {
+    let area = |u: usize, v: usize| {
+        let (e, f) = (
+            [q[1][u] - q[0][u], q[1][v] - q[0][v]],
+            [q[2][u] - q[0][u], q[2][v] - q[0][v]],
+        );
+        side(e[0] * f[1] - e[1] * f[0], reach, pick(q, u, v))
+    };
+    area(0, 1) == 0 && area(1, 2) == 0 && area(2, 0) == 0
 }
 
 /// Calls `emit(voxel)` for every voxel in which the triangle meets the line through the voxel

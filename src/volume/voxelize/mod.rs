@@ -12,8 +12,10 @@
 mod fill;
 mod kernel;
 mod lattice;
+mod octants;
 mod pyramid;
 mod raster;
+mod small;
 mod span;
 mod winding;
 
@@ -481,7 +483,11 @@ impl Stats {
 
     /// The grid the voxels stand in.
     pub fn lattice(&self) -> Lattice {
-        Lattice { lo: self.origin, h: self.spacing[0], dims: self.dims.map(|d| d as usize) }
+        Lattice {
+            lo: self.origin,
+            h: self.spacing[0],
+            dims: self.dims.map(|d| d as usize),
+        }
     }
 
     /// Octree nodes made against the nodes of the full tree.

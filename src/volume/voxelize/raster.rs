@@ -23,6 +23,8 @@ pub struct Surface<'a> {
     lattice: Lattice,
     mode: Mode,
     reversed: &'a [bool],
+    /// Bounds all coordinates.
+    reach: f64,
 }
 
 /// What was counted on the way.
@@ -47,11 +49,23 @@ impl Counts {
 impl<'a> Surface<'a> {
     /// The surface of `mesh` under a rule.
     pub fn new(mesh: &'a Mesh, lattice: Lattice, mode: Mode) -> Self {
+        let bounds = mesh.bounds();
+        let corners = if bounds.is_empty() {
+            [[0.0; 3]; 2]
+        } else {
+            [bounds.lo, bounds.hi]
+        };
+        // Rounding keeps the order, so nothing in the mesh is beyond its corners.
+        let reach = corners
+            .iter()
+            .flat_map(|p| lattice.to_grid(*p))
+            .fold(0.0, |m: f64, c| m.max(c.abs()));
         Surface {
             mesh,
             lattice,
             mode,
             reversed: &[],
+            reach,
         }
     }
 
@@ -136,7 +150,7 @@ impl<'a> Surface<'a> {
 
     #[inline]
     fn count(&self, index: usize, q: &Triangle) -> Counts {
-        if index < self.mesh.triangles.len() && kernel::is_degenerate(q) {
+        if index < self.mesh.triangles.len() && kernel::is_degenerate(q, self.reach) {
             Counts {
                 degenerate: 1,
                 first: Some(index as u64),

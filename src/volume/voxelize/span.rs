@@ -69,20 +69,32 @@ impl Span {
     }
 }
 
+/// Adding this rounds a number below 2^31 to the nearest integer and leaves it in the low bits.
+const ROUNDER: f64 = 6_755_399_441_055_744.0;
+
+/// The nearest integer, as a number and as an index, of `x` kept within what a cell index can be.
+///
+/// A plain cast would check for numbers that do not fit, which doubles the cost of a hot loop.
+#[inline(always)]
+fn nearest(x: f64) -> (f64, f64, i32) {
+    let x = if x > -1e9 { x } else { -1e9 };
+    let x = if x < 1e9 { x } else { 1e9 };
+    let shifted = x + ROUNDER;
+    (x, shifted - ROUNDER, shifted.to_bits() as i32)
+}
+
 /// Smallest integer not below `x`, kept within what a cell index can be.
-#[inline]
+#[inline(always)]
 pub fn ceil(x: f64) -> i32 {
-    let x = x.clamp(-1e9, 1e9);
-    let i = x as i32;
-    i + i32::from(f64::from(i) < x)
+    let (x, rounded, index) = nearest(x);
+    index + i32::from(rounded < x)
 }
 
 /// Largest integer not above `x`, kept within what a cell index can be.
-#[inline]
+#[inline(always)]
 pub fn floor(x: f64) -> i32 {
-    let x = x.clamp(-1e9, 1e9);
-    let i = x as i32;
-    i - i32::from(f64::from(i) > x)
+    let (x, rounded, index) = nearest(x);
+    index - i32::from(rounded > x)
 }
 
 /// `a u + b v + d >= 0`, to be solved for `u`.
@@ -275,7 +287,7 @@ impl Plane {
 
 /// The exact orientation of a projected triangle: from `area` (its signed double area) where that
 /// is beyond its rounding error, else by predicate on the coordinates `q` as given.
-#[inline]
+#[inline(always)]
 pub fn side(area: f64, reach: f64, q: [[f64; 2]; 3]) -> i32 {
     // Two products of differences of size 2 reach, each difference up to 4 roundoffs of reach off: 48.
     let error = 64.0 * ROUNDOFF * reach * reach;
