@@ -523,3 +523,6 @@ fn join(sets: &mut [u32], a: u32, b: u32) {
     let (a, b) = (find(sets, a), find(sets, b));
     sets[a.max(b) as usize] = a.min(b);
 }
+
+#[cfg(test)]
+mod tests;

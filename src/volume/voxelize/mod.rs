@@ -505,3 +505,6 @@ impl Stats {
         Modelled::new("octree nodes", self.octree_nodes, full, self.held_bytes)
     }
 }
+
+#[cfg(test)]
+mod tests;
