@@ -120,7 +120,8 @@ pub fn named<T: Clone + Send + Sync + 'static>(
     names: &'static [&'static str],
     value: fn(&str) -> Option<T>,
 ) -> impl TypedValueParser<Value = T> {
-    PossibleValuesParser::new(names).try_map(move |name| value(&name).ok_or("not a name in the list"))
+    PossibleValuesParser::new(names)
+        .try_map(move |name| value(&name).ok_or("not a name in the list"))
 }
 
 /// `N` finite numbers with commas between them.
@@ -128,7 +129,9 @@ pub fn list<const N: usize>(text: &str) -> Result<[f64; N], String> {
     let numbers: Result<Vec<f64>, _> = text.split(',').map(|word| word.trim().parse()).collect();
     let numbers = numbers.map_err(|_| "has something that is no number".to_owned())?;
     let count = numbers.len();
-    numbers.try_into().map_err(|_| format!("has {count} numbers, not {N}"))
+    numbers
+        .try_into()
+        .map_err(|_| format!("has {count} numbers, not {N}"))
 }
 
 /// A finite number that is 0 or more.

@@ -107,7 +107,9 @@ pub type Report = scantle::report::Report<Params, Stats>;
 /// Voxelizes each input.
 pub fn run(args: &Args) -> Result<Exit> {
     let context = Context::new(&args.common)?;
-    let size = args.voxel_size.map_or(Size::Resolution(args.resolution), Size::VoxelSize);
+    let size = args
+        .voxel_size
+        .map_or(Size::Resolution(args.resolution), Size::VoxelSize);
     let params = Params {
         size,
         mode: args.mode,
@@ -119,7 +121,9 @@ pub fn run(args: &Args) -> Result<Exit> {
         max_memory: context.memory(),
     };
     params.check()?;
-    let files = Files::each(&args.inputs).output(&args.output).preview(&args.preview);
+    let files = Files::each(&args.inputs)
+        .output(&args.output)
+        .preview(&args.preview);
     context.run("voxelize", &files, |job| voxelize(job, &params, args))
 }
 
@@ -143,11 +147,17 @@ fn voxelize(job: &mut Job, params: &Params, args: &Args) -> Result<Found<Params,
     }
     let [nx, ny, nz] = made.dims;
     let summary = format!("{} of {nx} x {ny} x {nz} voxels set", made.set_voxels);
-    let name = job.input().map(|input| stem(&input.path)).unwrap_or_default();
+    let name = job
+        .input()
+        .map(|input| stem(&input.path))
+        .unwrap_or_default();
     job.write_preview(|_| picture(&name, &mesh, &volume, &made, &accuracy[0]))?;
     let modelled = made.modelled();
     let found = Found::new(params.clone(), Stats { made, verified }, summary);
-    Ok(found.accuracy(Measures::Many(accuracy)).modelled(modelled).check("max-error", args.max_error.max_error))
+    Ok(found
+        .accuracy(Measures::Many(accuracy))
+        .modelled(modelled)
+        .check("max-error", args.max_error.max_error))
 }
 
 /// The mesh, and beside it its voxels.
@@ -161,13 +171,24 @@ fn picture(
     let [nx, ny, nz] = made.dims;
     let label = format!("{nx} × {ny} × {nz} voxels, {}", made.mode.name());
     let panels = [
-        Panel { label: name, what: What::Mesh(mesh), colour: CLAY },
-        Panel { label: &label, what: What::Voxels(volume), colour: OKABE_ITO[2] },
+        Panel {
+            label: name,
+            what: What::Mesh(mesh),
+            colour: CLAY,
+        },
+        Panel {
+            label: &label,
+            what: What::Voxels(volume),
+            colour: OKABE_ITO[2],
+        },
     ];
     let (sign, amount) = match (error.reached, error.bound) {
         (Some(reached), _) => ("=", reached),
         (None, bound) => ("≤", bound.unwrap_or(f64::INFINITY)),
     };
-    let caption = format!("{} voxels set · error {sign} {amount:.2} voxel", made.set_voxels);
+    let caption = format!(
+        "{} voxels set · error {sign} {amount:.2} voxel",
+        made.set_voxels
+    );
     preview::side_by_side(&panels, &caption, "", &preview::Params::DEFAULT)
 }

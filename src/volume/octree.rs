@@ -584,7 +584,7 @@ fn check_masks(masks: &[Vec<(u8, u8)>]) -> Result<(), Fault> {
         Err(Fault::element(
             "node",
             node,
-            format!("of level {level} below the root: {what}"),
+            format!("{what}, {level} levels below the root"),
         ))
     };
     for (level, nodes) in masks.iter().enumerate() {
@@ -604,6 +604,10 @@ fn check_masks(masks: &[Vec<(u8, u8)>]) -> Result<(), Fault> {
                 .sum(),
         };
         if nodes.len() != expected {
+            if level == 0 {
+                let what = format!("{} nodes at the root, not 1", nodes.len());
+                return Err(Fault::whole(what));
+            }
             let what = format!(
                 "{} nodes, but the level above asks for {expected}",
                 nodes.len()
