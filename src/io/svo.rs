@@ -104,8 +104,8 @@ fn levels(bytes: &[u8], root: usize, solid: bool) -> Result<Vec<Vec<(u8, u8)>>, 
     }
     let mut at = start;
     let mut levels = Vec::with_capacity(root);
-    for level in 0..root {
-        let length = counts[level] as usize * width(level);
+    for (level, count) in counts[..root].iter().enumerate() {
+        let length = *count as usize * width(level);
         let masks = &bytes[at..at + length];
         levels.push(match width(level) {
             2 => masks.chunks_exact(2).map(|m| (m[0], m[1])).collect(),

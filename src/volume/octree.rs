@@ -1007,7 +1007,8 @@ mod tests {
     fn masks_that_are_no_tree_are_refused() {
         let tree = Octree::from_bits(&random([70, 70, 70], 0.01, 1, 1));
         let good = tree.masks(false);
-        let spoilt = |f: &dyn Fn(&mut Vec<Vec<(u8, u8)>>)| {
+        type Masks = Vec<Vec<(u8, u8)>>;
+        let spoilt = |f: &dyn Fn(&mut Masks)| {
             let mut masks = good.clone();
             f(&mut masks);
             Octree::from_masks([70, 70, 70], masks)
