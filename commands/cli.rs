@@ -4,7 +4,7 @@ use crate::exit::Exit;
 use crate::streams::say;
 use crate::{compare, completions, convert, formats, info, man, schema, voxelize};
 use clap::error::ErrorKind;
-use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
+use clap::{Arg, CommandFactory, FromArgMatches, Parser, Subcommand};
 use std::fmt::Write;
 
 /// Geometry processing that measures the error it makes
@@ -53,8 +53,9 @@ Exit codes:
 
 /// The whole command line, for parsing, completions and manual pages.
 pub fn command() -> clap::Command {
-    let command =
-        Cli::command().mut_subcommand("convert", |c| c.mut_arg("output", |arg| arg.required(true)));
+    let command = Cli::command()
+        .mut_subcommand("convert", |c| c.mut_arg("output", |arg| arg.required(true)))
+        .mut_subcommands(|c| c.mut_args(take_negative_numbers));
     // Building adds the command `help`, which the list shows too.
     let mut built = command.clone();
     built.build();
@@ -63,6 +64,14 @@ pub fn command() -> clap::Command {
         grouped(&built)
     );
     command.help_template(template)
+}
+
+/// Lets `--option -1` be a value that is out of range, rather than an option that is not known.
+fn take_negative_numbers(arg: Arg) -> Arg {
+    if arg.is_positional() || !arg.get_action().takes_values() {
+        return arg;
+    }
+    arg.allow_negative_numbers(true)
 }
 
 /// The commands under the headings of [`GROUPS`].

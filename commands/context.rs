@@ -174,6 +174,11 @@ impl<'a> Context<'a> {
         let previews = files.plan_previews()?;
         let report = self.report_sink(outputs.as_deref())?;
         refuse_conflicts(files, outputs.as_deref(), previews.as_deref(), &report)?;
+        let results = outputs.iter().flatten().map(|(place, _)| place);
+        results
+            .chain(previews.iter().flatten())
+            .try_for_each(Destination::check)?;
+        report.iter().try_for_each(destination::check_folder)?;
 
         let with_bar = !self.common.quiet && progress::is_watched();
         let start = Cell::new(self.start);

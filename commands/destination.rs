@@ -4,6 +4,7 @@ use scantle::error::{Error, Result};
 use scantle::io::sink::Sink;
 use std::collections::BTreeMap;
 use std::fs;
+use std::io;
 use std::path::{Path, PathBuf};
 
 /// Where the result of one input goes.
@@ -16,6 +17,15 @@ pub struct Destination {
 }
 
 impl Destination {
+    /// Errs where the folder of the result is not there and will not be made: better said before
+    /// the work than after it.
+    pub fn check(&self) -> Result<()> {
+        if self.makes_folder {
+            return Ok(());
+        }
+        check_folder(&self.sink)
+    }
+
     /// Makes the folder that the user named, if there is need.
     pub fn prepare(&self) -> Result<()> {
         match self.sink.path().parent() {
@@ -27,6 +37,21 @@ impl Destination {
             }
             _ => Ok(()),
         }
+    }
+}
+
+/// Errs where the folder in which a file is to be written is not there.
+pub fn check_folder(sink: &Sink) -> Result<()> {
+    let folder = sink.path().parent().filter(|f| !f.as_os_str().is_empty());
+    match folder {
+        Some(folder) if !folder.is_dir() => {
+            let problem = format!("there is no folder {}", folder.display());
+            Err(Error::Write {
+                path: sink.path().to_owned(),
+                source: io::Error::new(io::ErrorKind::NotFound, problem),
+            })
+        }
+        _ => Ok(()),
     }
 }
 

@@ -140,11 +140,6 @@ impl<'a> Job<'a> {
         &self.recorder
     }
 
-    /// Bytes that an algorithm may take.
-    pub fn memory(&self) -> u64 {
-        self.context.memory()
-    }
-
     /// The format of the result, if one is to be written.
     pub fn output_format(&self) -> Option<Format> {
         self.output.as_ref().map(|(_, format)| *format)

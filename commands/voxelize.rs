@@ -5,6 +5,7 @@ use crate::destination::stem;
 use crate::exit::Exit;
 use crate::job::{Found, Job};
 use crate::shared::{Common, Inputs, MaxError, Output, Preview, Verify, list, named};
+use clap::value_parser;
 use scantle::error::Result;
 use scantle::image::colour::{CLAY, OKABE_ITO};
 use scantle::io::format::Kind;
@@ -12,6 +13,7 @@ use scantle::measure::voxel_error::{self, VoxelError};
 use scantle::mesh::Mesh;
 use scantle::render::preview::{self, Panel, What};
 use scantle::report::Measures;
+use scantle::volume::octree::MAX_DIM;
 use scantle::volume::surface::boundary_faces;
 use scantle::volume::voxelize::{self, Fill, Levels, Mode, Size, Storage};
 use scantle::volume::{Volume, voxelize::Params};
@@ -30,7 +32,7 @@ pub struct Args {
     #[command(flatten)]
     inputs: Inputs,
     /// Voxels along the longest side of the box
-    #[arg(long, value_name = "N", default_value_t = resolution(), conflicts_with = "voxel_size")]
+    #[arg(long, value_name = "N", default_value_t = resolution(), value_parser = value_parser!(u32).range(1..=MOST), conflicts_with = "voxel_size")]
     resolution: u32,
     /// Edge of a voxel, in the mesh's unit, instead of --resolution
     #[arg(long, value_name = "H")]
@@ -46,7 +48,7 @@ pub struct Args {
     #[arg(long, default_value = Params::DEFAULT.fill.name(), value_parser = named(Fill::NAMES, Fill::from_name))]
     fill: Fill,
     /// Voxels of margin on each side; without --bounds only
-    #[arg(long, value_name = "P", default_value_t = Params::DEFAULT.pad, conflicts_with = "bounds")]
+    #[arg(long, value_name = "P", default_value_t = Params::DEFAULT.pad, value_parser = value_parser!(u32).range(..=MOST), conflicts_with = "bounds")]
     pad: u32,
     /// The box to cover, in the mesh's unit, instead of the model's own: voxels start at its lower
     /// corner, and no margin is added
@@ -83,6 +85,9 @@ Examples:
   scantle voxelize fixtures/shapes/torus-knot.ply -o knot.nrrd --preview knot.png
   scantle voxelize fixtures/shapes/sphere.stl --resolution 64 --fill winding -o sphere.vdb
 ";
+
+/// Most voxels along an axis.
+const MOST: i64 = MAX_DIM as i64;
 
 fn resolution() -> u32 {
     match Params::DEFAULT.size {

@@ -1,6 +1,7 @@
 //! The same bytes on any number of threads, from a file and from a pipe.
 
-use crate::support::Workplace;
+use crate::support::{Workplace, packed};
+use serde_json::Value;
 use std::fs;
 
 /// An input, its format, and a command line for it that puts its result on standard output. `IN`
@@ -47,6 +48,66 @@ fn results_depend_on_no_thread_and_no_pipe() {
         let piped = format!("{} --input-format {format}", line.replace("IN", "-"));
         let piped = place.run_with_input(&piped, bytes).stdout;
         assert!(want == piped, "{line} differs through a pipe");
+    }
+}
+
+/// Words after `scantle voxelize INPUT`; the name of the output says its format.
+const VOXELIZATIONS: &[&str] = &[
+    "-o v.nrrd --grid dense --fill winding",
+    "-o v.nrrd --grid sparse --fill winding",
+    "-o v.svo --grid dense --fill parity",
+    "-o v.svo --grid sparse --fill parity --levels xy",
+    "-o v.vdb --grid sparse --mode three-axis --fill winding",
+    "-o v.binvox --grid dense --mode z --bounds -3.5,-3.5,-3.5,3.5,3.5,3.5",
+    "-o v.npy.gz --mode none --fill winding",
+    "-o v.ply --preview v.png --verify",
+];
+
+/// The report without what names the input.
+fn without_input(place: &Workplace) -> Value {
+    let text = fs::read_to_string(place.path("r.json")).expect("the report");
+    let mut report: Value = serde_json::from_str(&text).expect("JSON");
+    for key in ["path", "bytes", "sha256"] {
+        report["input"][0][key].take();
+    }
+    report
+}
+
+#[test]
+fn voxels_depend_on_no_thread_no_pipe_and_no_packing() {
+    const INPUT: &str = "fixtures/shapes/torus-knot.ply";
+    let place = Workplace::new();
+    let knot = fs::read(place.path(INPUT)).expect("the input");
+    place.put("knot.ply.gz", packed(&knot));
+    for words in VOXELIZATIONS {
+        let written = words
+            .split_whitespace()
+            .filter(|word| word.starts_with("v."));
+        let run = |input: &str, threads: u32| {
+            let line = format!(
+                "voxelize {input} --input-format ply --resolution 32 {words} --report r.json --threads {threads}"
+            );
+            let stdin = if input == "-" {
+                knot.clone()
+            } else {
+                Vec::new()
+            };
+            let ran = place.run_with_input(&line, stdin);
+            assert_eq!(ran.code, 0, "{line}: {}", ran.stderr);
+            let read = |name| fs::read(place.path(name)).expect("a result");
+            let files: Vec<Vec<u8>> = written.clone().map(read).collect();
+            (files, without_input(&place))
+        };
+        let want = run(INPUT, 1);
+        // The picture has the input's name in it, so those below are of a file of another name.
+        let drawn = words.contains("--preview");
+        assert!(want.0.iter().all(|file| !file.is_empty()), "{words}");
+        assert!(want == run(INPUT, 2), "{words} differs on 2 threads");
+        assert!(want == run(INPUT, 8), "{words} differs on 8 threads");
+        if !drawn {
+            assert!(want == run("-", 2), "{words} differs through a pipe");
+            assert!(want == run("knot.ply.gz", 2), "{words} differs packed");
+        }
     }
 }
 

@@ -30,12 +30,33 @@ const MESHES: &[Row<Mesh>] = &[
     ("shapes/torus-knot.ply", || {
         shapes::torus_knot(2, 3, 0.4, 160, 24)
     }),
+    ("shapes/points.ply", || Mesh {
+        points: (0..96).collect(),
+        ..helix(96)
+    }),
+    ("shapes/polyline.obj", || Mesh {
+        segments: (1..96).map(|i| [i - 1, i]).collect(),
+        ..helix(96)
+    }),
 ];
 
 const VOLUMES: &[Row<Volume>] = &[
     ("volumes/ball.nrrd", || ball(16)),
     ("volumes/ball.mha", || ball(16)),
 ];
+
+/// Vertices along three turns of a helix: radius 1, height 1.5, 32 to a turn.
+fn helix(n: u32) -> Mesh {
+    let at = |i: u32| {
+        let turns = f64::from(i) / 32.0;
+        let (sin, cos) = (std::f64::consts::TAU * turns).sin_cos();
+        [cos, sin, 0.5 * turns]
+    };
+    Mesh {
+        positions: (0..n).map(at).collect(),
+        ..Mesh::default()
+    }
+}
 
 /// The signed distance to a sphere of radius 0.75 around the origin, positive inside, in a cube
 /// of edge 2 with `n` samples along each axis.
@@ -73,6 +94,8 @@ fn are_near(name: &str, a: Vec<u8>, b: Vec<u8>) -> bool {
         .zip(b.positions.iter().flatten());
     a.positions.len() == b.positions.len()
         && a.triangles == b.triangles
+        && a.segments == b.segments
+        && a.points == b.points
         && coordinates.into_iter().all(|(x, y)| (x - y).abs() < 1e-6)
 }
 

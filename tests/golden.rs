@@ -2,7 +2,7 @@
 //!
 //! `cmd` holds the words after `scantle`, as if run from the repository root (what it writes goes
 //! to a temporary folder); `report.json` what it prints; `stderr` and `code` how it ends, where
-//! that is not with 0. `UPDATE_GOLDEN=1 cargo test golden` rewrites them; read the difference like
+//! that is not with 0. A run that fails leaves nothing behind. `UPDATE_GOLDEN=1 cargo test golden` rewrites them; read the difference like
 //! code.
 
 use crate::support::{Ran, Workplace, json, root, updating};
@@ -31,7 +31,12 @@ fn reports_are_as_they_were() {
     for case in &cases {
         let name = case.strip_prefix(root()).expect("a case is in here");
         let line = fs::read_to_string(case.join("cmd")).expect("a case has a cmd");
-        let ran = Workplace::new().run(&line);
+        let place = Workplace::new();
+        let ran = place.run(&line);
+        if ran.code > 1 && !place.names().is_empty() {
+            let left = place.names();
+            wrong.push(format!("{} failed and left {left:?}", name.display()));
+        }
         for report in ran.documents() {
             let problem = violation(&mut schemas, &line, &report);
             wrong.extend(problem.map(|problem| format!("{}: {problem}", name.display())));

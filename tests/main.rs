@@ -14,3 +14,5 @@ mod layers;
 mod licences;
 mod malformed;
 mod man;
+mod mutations;
+mod volumes;

@@ -9,8 +9,6 @@ pub mod binvox;
 pub mod format;
 pub mod gltf;
 mod header;
-#[cfg(test)]
-mod malformed;
 pub mod metaimage;
 pub mod npy;
 pub mod nrrd;
@@ -152,6 +150,9 @@ pub fn write_mesh(mesh: &Mesh, sink: &Sink, format: Format) -> Result<(Vec<Outpu
 }
 
 /// Writes a volume. MHD writes two files: the header and, beside it, the data.
+///
+/// Formats that hold bits only take numbers too where all of them are 0 or 1; they then cost a
+/// copy of one bit each.
 pub fn write_volume(
     volume: &Volume,
     sink: &Sink,
@@ -170,6 +171,11 @@ pub fn write_volume(
         Format::Svo => svo::write,
         _ => return Err(cannot_hold(format, Kind::Volume)),
     };
+    let packed = match format {
+        Format::Svo | Format::Vdb | Format::Binvox => samples::as_bits(volume),
+        _ => None,
+    };
+    let volume = packed.as_ref().unwrap_or(volume);
     if let Some(problem) = refusal(volume, format) {
         return Err(Error::parameter("output-format", format.name(), problem));
     }
@@ -182,7 +188,7 @@ fn refusal(volume: &Volume, format: Format) -> Option<String> {
     let binary = volume.is_binary();
     match format {
         Format::Svo | Format::Vdb | Format::Binvox if !binary => Some(format!(
-            "holds bits only, and the voxels are {}",
+            "holds bits only, and the voxels are {} with values other than 0 and 1",
             volume.data.sample_type()
         )),
         Format::Binvox => binvox::refusal(volume),

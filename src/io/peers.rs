@@ -12,6 +12,8 @@ use std::fs;
 use std::io::{self, Write};
 use std::path::Path;
 
+type Writer = fn(&Volume, &mut dyn Write) -> io::Result<()>;
+
 /// A frame whose axes are turned about z by the angle of 3-4-5.
 fn turned(dims: [usize; 3]) -> Frame {
     Frame {
@@ -161,7 +163,7 @@ fn sparse_and_dense_volumes_are_written_alike() {
             frame: dense.frame,
             data: Data::Sparse(Octree::from_bits(grid)),
         };
-        let writers: [fn(&Volume, &mut dyn Write) -> io::Result<()>; 6] = [
+        let writers: [Writer; 6] = [
             super::nrrd::write,
             super::metaimage::write,
             super::npy::write,

@@ -234,6 +234,19 @@ pub fn pack_bits(bytes: &[u8], dims: [usize; 3]) -> BitGrid {
     grid
 }
 
+/// The same volume as bits, where its samples are numbers and all of them 0 or 1.
+pub fn as_bits(volume: &Volume) -> Option<Volume> {
+    let is_mask = with_samples!(&volume.data, v => v.iter().all(|s| matches!(*s as f64, 0.0 | 1.0)), _ => false);
+    is_mask.then(|| {
+        let mut grid = BitGrid::new(volume.frame.dims);
+        volume.read_bit_slices(0, &mut grid);
+        Volume {
+            frame: volume.frame,
+            data: Data::Bits(grid),
+        }
+    })
+}
+
 /// Bytes that the samples of a volume take raw: bits as one byte each.
 pub fn raw_length(volume: &Volume) -> u64 {
     volume.frame.len() as u64 * SampleType::of(&volume.data).bytes() as u64

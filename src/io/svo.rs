@@ -43,11 +43,20 @@ pub fn read(source: &Source, _warnings: &mut Vec<Warning>) -> Result<Volume, Fau
     })?;
     let word = |at: usize| u64::from_le_bytes(std::array::from_fn(|i| header[at + i]));
     let half = |at: usize| u32::from_le_bytes(std::array::from_fn(|i| header[at + i]));
+    if !header.starts_with(MAGIC) {
+        return Err(Fault::byte(0, "does not begin with \"SCANTLE-SVO\""));
+    }
     let (version, flags, root) = (half(12), half(16), half(20) as usize);
     if version != VERSION {
         return Err(Fault::byte(
             12,
             format!("version {version} is not known, only {VERSION}"),
+        ));
+    }
+    if flags > 1 {
+        return Err(Fault::byte(
+            16,
+            format!("flags {flags:#x} are not known, only 0x1"),
         ));
     }
     let dims64: [u64; 3] = std::array::from_fn(|a| word(24 + 8 * a));
@@ -95,8 +104,8 @@ fn levels(bytes: &[u8], root: usize, solid: bool) -> Result<Vec<Vec<(u8, u8)>>, 
     }
     let mut at = start;
     let mut levels = Vec::with_capacity(root);
-    for level in 0..root {
-        let length = counts[level] as usize * width(level);
+    for (level, count) in counts[..root].iter().enumerate() {
+        let length = *count as usize * width(level);
         let masks = &bytes[at..at + length];
         levels.push(match width(level) {
             2 => masks.chunks_exact(2).map(|m| (m[0], m[1])).collect(),

@@ -89,7 +89,7 @@ impl Mesh {
     pub fn bounds(&self) -> Aabb {
         self.positions
             .par_chunks(1 << 14)
-            .map(|chunk| Aabb::around(chunk))
+            .map(Aabb::around)
             .reduce(|| Aabb::EMPTY, Aabb::union)
     }
 
@@ -130,14 +130,13 @@ impl Mesh {
                 format!("refers to vertex {v}, but there are {count}"),
             )
         };
-        if let Some(polygons) = &self.polygons {
-            if let Some((f, v)) = polygons
+        if let Some(polygons) = &self.polygons
+            && let Some((f, v)) = polygons
                 .iter()
                 .enumerate()
                 .find_map(|(f, face)| out(face).map(|v| (f, v)))
-            {
-                return Err(refers("face", f, v));
-            }
+        {
+            return Err(refers("face", f, v));
         }
         let bad = self
             .triangles

@@ -584,7 +584,7 @@ fn check_masks(masks: &[Vec<(u8, u8)>]) -> Result<(), Fault> {
         Err(Fault::element(
             "node",
             node,
-            format!("of level {level} below the root: {what}"),
+            format!("{what}, {level} levels below the root"),
         ))
     };
     for (level, nodes) in masks.iter().enumerate() {
@@ -604,6 +604,10 @@ fn check_masks(masks: &[Vec<(u8, u8)>]) -> Result<(), Fault> {
                 .sum(),
         };
         if nodes.len() != expected {
+            if level == 0 {
+                let what = format!("{} nodes at the root, not 1", nodes.len());
+                return Err(Fault::whole(what));
+            }
             let what = format!(
                 "{} nodes, but the level above asks for {expected}",
                 nodes.len()
@@ -1003,7 +1007,8 @@ mod tests {
     fn masks_that_are_no_tree_are_refused() {
         let tree = Octree::from_bits(&random([70, 70, 70], 0.01, 1, 1));
         let good = tree.masks(false);
-        let spoilt = |f: &dyn Fn(&mut Vec<Vec<(u8, u8)>>)| {
+        type Masks = Vec<Vec<(u8, u8)>>;
+        let spoilt = |f: &dyn Fn(&mut Masks)| {
             let mut masks = good.clone();
             f(&mut masks);
             Octree::from_masks([70, 70, 70], masks)

@@ -9,6 +9,8 @@ use scantle::io;
 use scantle::io::source::Source;
 use scantle::io::{npy, nrrd, obj, off, ply, stl};
 use scantle::mesh::{Mesh, shapes};
+use scantle::progress::Silent;
+use scantle::volume::voxelize::{Fill, Mode, Params, Size, Storage, voxelize};
 use scantle::volume::{Data, Frame, Volume};
 use serde_json::json;
 use std::io::Write;
@@ -40,16 +42,28 @@ impl Plan {
         sizes[..if self.quick { 1 } else { 3 }].to_vec()
     }
 
-    /// Measures `work` on `elements` of a `unit` and prints a line. It returns the bytes it passed.
-    fn measure(&self, name: &str, unit: &str, elements: usize, mut work: impl FnMut() -> usize) {
-        let repeats = if self.quick { 1 } else { 5 };
-        let mut least = f64::INFINITY;
-        let mut bytes = 0;
-        for _ in 0..repeats {
+    /// The least seconds that `work` takes, and what it returns.
+    fn time<T>(&self, repeats: usize, mut work: impl FnMut() -> T) -> (f64, T) {
+        let mut once = || {
             let start = Instant::now();
-            bytes = std::hint::black_box(work());
-            least = least.min(start.elapsed().as_secs_f64());
-        }
+            let result = std::hint::black_box(work());
+            (start.elapsed().as_secs_f64(), result)
+        };
+        let first = once();
+        (1..repeats).fold(first, |(least, _), _| {
+            let (seconds, result) = once();
+            (least.min(seconds), result)
+        })
+    }
+
+    fn repeats(&self) -> usize {
+        if self.quick { 1 } else { 5 }
+    }
+
+    /// Measures `work` on `elements` of a `unit` and prints a line. It returns the bytes it passed.
+    fn measure(&self, name: &str, unit: &str, elements: usize, work: impl FnMut() -> usize) {
+        let repeats = self.repeats();
+        let (least, bytes) = self.time(repeats, work);
         let line = json!({
             "bench": name,
             "unit": unit,
@@ -135,8 +149,114 @@ fn volumes(plan: &Plan) {
     }
 }
 
+/// What is voxelized, and how.
+struct Voxelization {
+    name: &'static str,
+    resolution: u32,
+    mode: Mode,
+    fill: Fill,
+    grid: Storage,
+}
+
+const SURFACE: Voxelization = Voxelization {
+    name: "surface",
+    resolution: 256,
+    mode: Mode::Conservative,
+    fill: Fill::None,
+    grid: Storage::Dense,
+};
+
+/// Each kind of result once.
+const VOXELIZATIONS: &[Voxelization] = &[
+    SURFACE,
+    Voxelization {
+        name: "surface",
+        resolution: 512,
+        ..SURFACE
+    },
+    Voxelization {
+        name: "three-axis",
+        mode: Mode::ThreeAxis,
+        ..SURFACE
+    },
+    Voxelization {
+        name: "sparse",
+        resolution: 1024,
+        grid: Storage::Sparse,
+        ..SURFACE
+    },
+    Voxelization {
+        name: "parity",
+        fill: Fill::Parity,
+        ..SURFACE
+    },
+    Voxelization {
+        name: "winding",
+        fill: Fill::Winding,
+        ..SURFACE
+    },
+];
+
+impl Voxelization {
+    /// Measures it on a mesh and prints a line; a quick plan takes a quarter of the resolution.
+    fn measure(&self, plan: &Plan, of: &str, mesh: &Mesh) {
+        let resolution = if plan.quick {
+            self.resolution / 4
+        } else {
+            self.resolution
+        };
+        let params = Params {
+            size: Size::Resolution(resolution),
+            mode: self.mode,
+            fill: self.fill,
+            grid: self.grid,
+            ..Params::DEFAULT
+        };
+        let repeats = plan.repeats();
+        let (seconds, stats) = plan.time(repeats, || {
+            let (_, stats) =
+                voxelize(mesh, &params, &Silent).expect("the shapes have size and fit in memory");
+            stats
+        });
+        let triangles = mesh.triangles.len();
+        let line = json!({
+            "bench": format!("voxelize-{}-{of}", self.name),
+            "resolution": resolution,
+            "triangles": triangles,
+            "set_voxels": stats.set_voxels,
+            "seconds": seconds,
+            "triangles_per_second": triangles as f64 / seconds,
+            "set_voxels_per_second": stats.set_voxels as f64 / seconds,
+            "repeats": repeats,
+            "threads": rayon::current_num_threads(),
+        });
+        println!("{line}");
+    }
+}
+
+/// A torus knot in each way; 4 x 4 x 4 spheres at three numbers of triangles.
+fn voxelizations(plan: &Plan) {
+    let wanted =
+        |of: &str, case: &Voxelization| plan.wants(&format!("voxelize-{}-{of}", case.name));
+    let knot = shapes::torus_knot(2, 3, 0.4, 288, 92);
+    for case in VOXELIZATIONS {
+        if wanted("knot", case) {
+            case.measure(plan, "knot", &knot);
+        }
+    }
+    if !wanted("spheres", &SURFACE) {
+        return;
+    }
+    for triangles in plan.sizes(32_768) {
+        let detail = ((triangles / 64 / 8) as f64).sqrt() as usize;
+        let spheres = shapes::sphere_grid(4, 0.8, 2.0, detail);
+        SURFACE.measure(plan, "spheres", &spheres);
+    }
+}
+
 fn main() {
     let plan = Plan::from_words(std::env::args().skip(1));
     meshes(&plan);
     volumes(&plan);
+    voxelizations(&plan);
 }

@@ -2,6 +2,8 @@
 
 pub mod json;
 
+use flate2::Compression;
+use flate2::write::GzEncoder;
 use std::ffi::OsStr;
 use std::fs;
 use std::io::Write;
@@ -131,6 +133,13 @@ pub fn ran(output: std::io::Result<Output>) -> Ran {
         stdout: output.stdout,
         stderr: String::from_utf8(output.stderr).expect("standard error is text"),
     }
+}
+
+/// Bytes with a gzip layer.
+pub fn packed(bytes: &[u8]) -> Vec<u8> {
+    let mut packer = GzEncoder::new(Vec::new(), Compression::fast());
+    packer.write_all(bytes).expect("memory can be written");
+    packer.finish().expect("memory can be written")
 }
 
 /// All files below a folder, in the order of their names.

@@ -1,0 +1,108 @@
+//! Voxels survive every way through the formats, and `compare` sees each one that does not.
+
+use crate::support::Workplace;
+use std::fs;
+
+/// The names of the volume formats that are written and, where `read`, read too.
+fn volume_formats(place: &Workplace, read: bool) -> Vec<String> {
+    let table = place.run("formats --json").document();
+    let rows = table["formats"].as_array().expect("rows");
+    rows.iter()
+        .filter(|row| row["kind"] == "volume" && row["write"] == true)
+        .filter(|row| !read || row["read"] == true)
+        .map(|row| row["name"].as_str().expect("a name").to_owned())
+        .collect()
+}
+
+/// A ring in a cube of 20 voxels an edge, as an octree.
+fn with_a_ring() -> Workplace {
+    let place = Workplace::new();
+    let line = "voxelize fixtures/shapes/torus.obj --resolution 20 --grid sparse \
+                --bounds -1.5,-1.5,-1.5,1.5,1.5,1.5 -o ring.svo";
+    let ran = place.run(line);
+    assert_eq!(ran.code, 0, "{}", ran.stderr);
+    place
+}
+
+fn differing(place: &Workplace, a: &str, b: &str) -> u64 {
+    let ran = place.run(&format!("compare {a} {b} --tolerance 0"));
+    assert_eq!(ran.code, 0, "{a} and {b}: {}", ran.stderr);
+    let report = ran.document();
+    assert_eq!(report["result"]["voxels"], 8000, "{a} and {b}");
+    report["result"]["differing"].as_u64().expect("a count")
+}
+
+#[test]
+fn every_way_between_formats_keeps_every_voxel() {
+    let place = with_a_ring();
+    let read = volume_formats(&place, true);
+    assert!(read.len() >= 6, "{read:?}");
+    for first in &read {
+        let ran = place.run(&format!("convert ring.svo -o first.{first}"));
+        assert_eq!(ran.code, 0, "{first}: {}", ran.stderr);
+        for second in volume_formats(&place, false) {
+            let line = format!("convert first.{first} -o second.{second}");
+            let ran = place.run(&line);
+            assert_eq!(ran.code, 0, "{line}: {}", ran.stderr);
+            if read.contains(&second) {
+                let differing = differing(&place, &format!("second.{second}"), "ring.svo");
+                assert_eq!(differing, 0, "{line}");
+            }
+        }
+    }
+}
+
+#[test]
+fn a_sparse_grid_is_written_as_a_dense_one_is() {
+    let place = with_a_ring();
+    for format in volume_formats(&place, false) {
+        for grid in ["dense", "sparse"] {
+            let line = format!(
+                "voxelize fixtures/shapes/torus.obj --resolution 70 --fill winding --grid {grid} \
+                 --bounds -1.5,-1.5,-1.5,1.5,1.5,1.5 -o {grid}.{format}"
+            );
+            let ran = place.run(&line);
+            assert_eq!(ran.code, 0, "{line}: {}", ran.stderr);
+        }
+        let read = |grid: &str| fs::read(place.path(&format!("{grid}.{format}"))).expect("a file");
+        // The header names the data file beside it, which has the name of its own header.
+        let (dense, sparse) = if format == "mhd" {
+            let read = |grid: &str| fs::read(place.path(&format!("{grid}.raw"))).expect("a file");
+            (read("dense"), read("sparse"))
+        } else {
+            (read("dense"), read("sparse"))
+        };
+        assert!(dense == sparse, "{format}");
+    }
+}
+
+#[test]
+fn one_voxel_that_differs_fails_the_check() {
+    let place = with_a_ring();
+    let ran = place.run("convert ring.svo -o flipped.npy");
+    assert_eq!(ran.code, 0, "{}", ran.stderr);
+    let mut bytes = fs::read(place.path("flipped.npy")).expect("the file");
+    *bytes.last_mut().expect("a byte") ^= 1;
+    place.put("flipped.npy", bytes);
+    let ran = place.run("compare ring.svo flipped.npy --tolerance 0");
+    assert_eq!(ran.code, 1, "{}", ran.stderr);
+    assert_eq!(ran.document()["result"]["differing"], 1);
+    let why = "check failed: differing voxels is 1 voxel, larger than --tolerance 0\n";
+    assert!(ran.stderr.ends_with(why), "{}", ran.stderr);
+    let ran = place.run("compare ring.svo flipped.npy --tolerance 1");
+    assert_eq!(ran.code, 0, "{}", ran.stderr);
+}
+
+#[test]
+fn numbers_other_than_0_and_1_are_no_bits() {
+    let place = Workplace::new();
+    for format in ["svo", "vdb", "binvox"] {
+        let ran = place.run(&format!(
+            "convert fixtures/volumes/ball.nrrd -o ball.{format}"
+        ));
+        assert_eq!(ran.code, 2, "{}", ran.stderr);
+        let why = "holds bits only, and the voxels are f32 with values other than 0 and 1\n";
+        assert!(ran.stderr.ends_with(why), "{}", ran.stderr);
+    }
+    assert!(place.names().is_empty());
+}
