@@ -11,30 +11,51 @@
 //! * [`crossings`]: like columns along x, but each line is met by exactly one of the triangles that
 //!   share an edge, for inside and outside.
 
-use super::span::{Edges, Plane, Sample, Span, ceil, floor, side};
-use super::{octants, small};
+use super::octants;
+use super::span::{Edges, Plane, Sample, Span, ceil, ceil4, floor, floor4, side};
 use crate::numeric::predicates::{orient2d, orient3d};
 use crate::numeric::vector::{Vec3, cross, sub};
+use wide::f64x4;
 
 /// A triangle in grid coordinates.
 pub type Triangle = [Vec3; 3];
 
-/// A box of voxels: `lo` to `hi`, both included. Nothing outside is set.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+/// A box of voxels. Nothing outside is set.
+#[derive(Debug, Clone, Copy)]
 pub struct Clip {
-    /// First voxel.
-    pub lo: [i32; 3],
-    /// Last voxel.
-    pub hi: [i32; 3],
+    lo: [i32; 3],
+    hi: [i32; 3],
+    /// The same with a fourth axis of one cell, which never clips.
+    low: f64x4,
+    high: f64x4,
 }
 
 impl Clip {
+    /// The voxels from `lo` to `hi`, both included.
+    pub fn new(lo: [i32; 3], hi: [i32; 3]) -> Self {
+        let lanes =
+            |c: [i32; 3], fourth: f64| f64x4::new([c[0].into(), c[1].into(), c[2].into(), fourth]);
+        Clip {
+            lo,
+            hi,
+            low: lanes(lo, -2.0),
+            high: lanes(hi, 2.0),
+        }
+    }
+
+    /// The first voxel.
+    pub fn lo(&self) -> [i32; 3] {
+        self.lo
+    }
+
+    /// The last voxel.
+    pub fn hi(&self) -> [i32; 3] {
+        self.hi
+    }
+
     /// All voxels of a grid.
     pub fn grid(dims: [usize; 3]) -> Self {
-        Clip {
-            lo: [0; 3],
-            hi: dims.map(|d| d as i32 - 1),
-        }
+        Clip::new([0; 3], dims.map(|d| d as i32 - 1))
     }
 }
 
@@ -108,34 +129,62 @@ impl Local {
 }
 
 /// Calls `emit(x0, x1, y, z)` for every run of voxels whose closed cubes the closed triangle meets.
+/// Returns whether it noticed in passing that the triangle has an area.
 ///
 /// Triangles without area are met as the segments or points they are. `rows` is working memory.
 /// Cost: in the number of rows that the triangle's bounds span, plus a constant.
-#[inline]
+#[inline(always)]
 pub fn overlap(
     q: &Triangle,
     clip: &Clip,
     rows: &mut Vec<Span>,
     emit: &mut impl FnMut(i32, i32, i32, i32),
-) {
-    let mut range = [(0, 0); 3];
-    let (mut several, mut longest, mut clipped) = (0, 0, false);
-    for a in 0..3 {
-        let (first, last) = (ceil(least(q, a)) - 1, floor(greatest(q, a)));
-        range[a] = (first.max(clip.lo[a]), last.min(clip.hi[a]));
-        several |= usize::from(first < last) << a;
-        longest = longest.max(last - first);
-        clipped |= range[a] != (first, last);
+) -> bool {
+    let lanes = q.map(|[x, y, z]| f64x4::new([x, y, z, 0.0]));
+    let one = f64x4::ONE;
+    // The first and the last cell along each axis: those whose closed sides the bounds meet.
+    let low = ceil4(lanes[0].fast_min(lanes[1]).fast_min(lanes[2])) - one;
+    let high = floor4(lanes[0].fast_max(lanes[1]).fast_max(lanes[2]));
+    if (low.simd_gt(clip.high) | high.simd_lt(clip.low)).to_bitmask() != 0 {
+        return false;
     }
-    if !clipped && longest == 1 {
-        let base = range.map(|r| r.0);
-        if let Some(mask) = octants::touched(q, base.map(|c| f64::from(c + 1))) {
-            return pairs(mask, base, emit);
+    let clipped = (low.simd_lt(clip.low) | high.simd_gt(clip.high)).to_bitmask() & 7;
+    let spans = high - low;
+    let whole = |c: f64x4| {
+        let [x, y, z, _] = c.to_array();
+        [x as i32, y as i32, z as i32]
+    };
+    let (first, last) = (whole(low), whole(high));
+    if clipped | spans.simd_gt(one).to_bitmask() & 7 == 0 {
+        if let Some((mask, has_area)) = octants::touched(&lanes, low + one) {
+            pairs(mask, first, emit);
+            return has_area;
+        }
+    } else if clipped | spans.simd_ge(f64x4::splat(octants::EDGE)).to_bitmask() & 7 == 0 {
+        let size = std::array::from_fn(|a| (last[a] - first[a] + 1) as usize);
+        if let Some((mask, has_area)) = octants::cells(&lanes, low, size) {
+            quads(mask, first, emit);
+            return has_area;
         }
     }
-    if clipped && range.iter().any(|r| r.0 > r.1) {
-        return;
-    }
+    wide_overlap(q, first, last, clip, rows, emit);
+    false
+}
+
+/// [`overlap`] for triangles that span many voxels, leave the clip, or pass too near to a corner;
+/// `first` and `last` are the cells of their bounds.
+#[inline(never)]
+fn wide_overlap(
+    q: &Triangle,
+    first: [i32; 3],
+    last: [i32; 3],
+    clip: &Clip,
+    rows: &mut Vec<Span>,
+    emit: &mut impl FnMut(i32, i32, i32, i32),
+) {
+    let range: [(i32, i32); 3] =
+        std::array::from_fn(|a| (first[a].max(clip.lo[a]), last[a].min(clip.hi[a])));
+    let several = (0..3).fold(0, |bits, a| bits | usize::from(first[a] < last[a]) << a);
     let [x, y, z] = range;
     // A connected set inside a slab one cell thick meets a cell exactly where its projection does,
     // and inside a row of cells it meets every cell between its ends.
@@ -146,9 +195,6 @@ pub fn overlap(
             }
         }
         return;
-    }
-    if !clipped && longest < small::EDGE {
-        return few(q, range, several, emit);
     }
     let local = Local::new(q, range);
     if local.reach > LARGE {
@@ -244,53 +290,31 @@ pub fn overlap(
     }
 }
 
-/// Emits the voxels of a mask of octants, whose lowest voxel is `base`.
+/// Emits the voxels of a mask of octants, in which bits count from the highest of eight voxels down;
+/// `base` is the lowest.
 #[inline(always)]
 fn pairs(mask: u8, base: [i32; 3], emit: &mut impl FnMut(i32, i32, i32, i32)) {
     for row in 0..4 {
         let pair = i32::from(mask) >> (2 * row) & 3;
         if pair != 0 {
+            let (first, last) = (i32::from(pair == 1), i32::from(pair != 2));
             emit(
-                base[0] + (pair == 2) as i32,
-                base[0] + (pair >> 1),
-                base[1] + (row & 1),
-                base[2] + (row >> 1),
+                base[0] + first,
+                base[0] + last,
+                base[1] + 1 - (row & 1),
+                base[2] + 1 - (row >> 1),
             );
         }
     }
 }
 
-/// [`overlap`] for a triangle that spans few voxels, all of them within the clip.
-#[inline]
-fn few(
-    q: &Triangle,
-    range: [(i32, i32); 3],
-    several: usize,
-    emit: &mut impl FnMut(i32, i32, i32, i32),
-) {
-    let base = range.map(|r| r.0);
-    let cells = small::touched(q, base, range.map(|r| r.1 - r.0 + 1), several);
-    let mut open = cells.possible & !cells.certain;
-    let mut set = cells.certain;
-    while open != 0 {
-        let bit = open.trailing_zeros() as i32;
-        if touches(
-            q,
-            [
-                base[0] + (bit & 3),
-                base[1] + (bit >> 2 & 3),
-                base[2] + (bit >> 4),
-            ],
-            1,
-        ) {
-            set |= 1 << bit;
-        }
-        open &= open - 1;
-    }
+/// Emits the voxels of a mask of four along each axis, from `base` on.
+#[inline(always)]
+fn quads(mut mask: u64, base: [i32; 3], emit: &mut impl FnMut(i32, i32, i32, i32)) {
     // What a convex set touches of a row is one run.
-    while set != 0 {
-        let row = set.trailing_zeros() as i32 >> 2;
-        let cells = (set >> (4 * row) & 0xf) as u32;
+    while mask != 0 {
+        let row = mask.trailing_zeros() as i32 >> 2;
+        let cells = (mask >> (4 * row) & 0xf) as u32;
         let (first, last) = (
             cells.trailing_zeros() as i32,
             31 - cells.leading_zeros() as i32,
@@ -301,7 +325,7 @@ fn few(
             base[1] + (row & 3),
             base[2] + (row >> 2),
         );
-        set &= !(0xf << (4 * row));
+        mask &= !(0xf << (4 * row));
     }
 }
 

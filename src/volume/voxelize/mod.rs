@@ -15,7 +15,6 @@ mod lattice;
 mod octants;
 mod pyramid;
 mod raster;
-mod small;
 mod span;
 mod winding;
 

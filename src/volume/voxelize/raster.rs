@@ -108,8 +108,9 @@ impl<'a> Surface<'a> {
         index >= self.mesh.triangles.len() + self.mesh.segments.len()
     }
 
-    /// Emits the runs `(x0, x1, y, z)` of voxels that a primitive sets within `clip`.
-    #[inline]
+    /// Emits the runs `(x0, x1, y, z)` of voxels that a primitive sets within `clip`. Returns whether
+    /// it noticed in passing that the primitive has an area.
+    #[inline(always)]
     pub fn set(
         &self,
         index: usize,
@@ -117,9 +118,12 @@ impl<'a> Surface<'a> {
         clip: &Clip,
         rows: &mut Vec<Span>,
         emit: &mut impl FnMut(i32, i32, i32, i32),
-    ) {
+    ) -> bool {
         let axes: &[usize] = match self.mode {
-            Mode::Conservative if self.is_point(index) => return self.set_point(q, clip, emit),
+            Mode::Conservative if self.is_point(index) => {
+                self.set_point(q, clip, emit);
+                &[]
+            }
             Mode::Conservative => return kernel::overlap(q, clip, rows, emit),
             Mode::ThreeAxis => &[0, 1, 2],
             Mode::Z => &[2],
@@ -130,6 +134,7 @@ impl<'a> Surface<'a> {
                 emit(x, x, y, z)
             });
         }
+        false
     }
 
     /// A point sets the voxel that holds it: on a face between two the upper one, on the upper face
@@ -141,7 +146,7 @@ impl<'a> Surface<'a> {
             if q[0][a] == self.lattice.dims[a] as f64 {
                 at[a] -= 1;
             }
-            if at[a] < clip.lo[a] || at[a] > clip.hi[a] {
+            if at[a] < clip.lo()[a] || at[a] > clip.hi()[a] {
                 return;
             }
         }
@@ -173,11 +178,13 @@ impl<'a> Surface<'a> {
                 let last = ((chunk + 1) * CHUNK).min(count);
                 for index in chunk * CHUNK..last {
                     let q = self.primitive(index);
-                    counts = counts.and(self.count(index, &q));
-                    self.set(index, &q, &clip, rows, &mut |x0, x1, y, z| {
+                    let has_area = self.set(index, &q, &clip, rows, &mut |x0, x1, y, z| {
                         let row = (z as usize * ny + y as usize) * stride;
                         set_run_atomic(&words[row..row + stride], x0 as usize, x1 as usize);
                     });
+                    if !has_area {
+                        counts = counts.and(self.count(index, &q));
+                    }
                 }
                 progress.advance((last - chunk * CHUNK) as u64);
                 counts
@@ -334,10 +341,10 @@ impl<'a> Surface<'a> {
     fn tile(&self, at: [usize; 3], group: &[u64], worker: &mut Worker) {
         let lo = at.map(|t| (t * TILE) as i32);
         let last = self.lattice.dims.map(|d| d as i32 - 1);
-        let clip = Clip {
+        let clip = Clip::new(
             lo,
-            hi: std::array::from_fn(|a| (lo[a] + TILE as i32 - 1).min(last[a])),
-        };
+            std::array::from_fn(|a| (lo[a] + TILE as i32 - 1).min(last[a])),
+        );
         let Worker { tile, rows } = worker;
         for pair in group {
             let index = (pair & 0xffff_ffff) as usize;

@@ -6,6 +6,7 @@
 //! generic input none is left open, so exactness costs nothing.
 
 use crate::numeric::predicates::orient2d;
+use wide::f64x4;
 
 /// Unit roundoff of f64.
 const ROUNDOFF: f64 = f64::EPSILON / 2.0;
@@ -95,6 +96,26 @@ pub fn ceil(x: f64) -> i32 {
 pub fn floor(x: f64) -> i32 {
     let (x, rounded, index) = nearest(x);
     index - i32::from(rounded > x)
+}
+
+/// [`ceil`] of four numbers, as numbers.
+#[inline(always)]
+pub fn ceil4(x: f64x4) -> f64x4 {
+    let (x, rounded) = nearest4(x);
+    rounded + (rounded.simd_lt(x) & f64x4::ONE)
+}
+
+/// [`floor`] of four numbers, as numbers.
+#[inline(always)]
+pub fn floor4(x: f64x4) -> f64x4 {
+    let (x, rounded) = nearest4(x);
+    rounded - (rounded.simd_gt(x) & f64x4::ONE)
+}
+
+#[inline(always)]
+fn nearest4(x: f64x4) -> (f64x4, f64x4) {
+    let x = x.fast_max(f64x4::splat(-1e9)).fast_min(f64x4::splat(1e9));
+    (x, x + f64x4::splat(ROUNDER) - f64x4::splat(ROUNDER))
 }
 
 /// `a u + b v + d >= 0`, to be solved for `u`.

@@ -159,9 +159,7 @@ fn perturbed(q: &Triangle, dims: [usize; 3]) -> Vec<(i32, i32, i32, i32)> {
             );
             let [x, _, _, w] = &line[0];
             let nx = dims[0] as i32;
-            let first = (0..nx)
-                .find(|i| (2 * i + 1) * w >= 2 * x)
-                .unwrap_or(nx);
+            let first = (0..nx).find(|i| (2 * i + 1) * w >= 2 * x).unwrap_or(nx);
             found.push((first, j, k, if facing == Sign::Plus { 1 } else { -1 }));
         }
     }
@@ -178,7 +176,7 @@ fn collect(f: impl FnOnce(&mut dyn FnMut([i32; 3]))) -> Voxels {
 
 /// The wanted voxels within a clip.
 fn within(all: &Voxels, clip: &Clip) -> Voxels {
-    let held = |v: &&[i32; 3]| (0..3).all(|a| clip.lo[a] <= v[a] && v[a] <= clip.hi[a]);
+    let held = |v: &&[i32; 3]| (0..3).all(|a| clip.lo()[a] <= v[a] && v[a] <= clip.hi()[a]);
     all.iter().filter(held).copied().collect()
 }
 
@@ -187,14 +185,8 @@ const DIMS: [usize; 3] = [6, 8, 7];
 fn check(name: &str, q: &Triangle) -> usize {
     let clips = [
         Clip::grid(DIMS),
-        Clip {
-            lo: [1, 2, 3],
-            hi: [4, 2, 5],
-        },
-        Clip {
-            lo: [3, 0, 4],
-            hi: [5, 7, 6],
-        },
+        Clip::new([1, 2, 3], [4, 2, 5]),
+        Clip::new([3, 0, 4], [5, 7, 6]),
     ];
     let met = boxes(q, DIMS, 1);
     let mut rows: Vec<Span> = Vec::new();
@@ -259,8 +251,9 @@ fn towards(p: [f64; 3], q: [f64; 3], t: f64) -> [f64; 3] {
 }
 
 fn large(rng: &mut Rng, size: f64) -> Triangle {
-    let far =
-        |rng: &mut Rng| -> [f64; 3] { [0; 3].map(|_| (rng.range(-size, size) * 4.0).round() / 4.0) };
+    let far = |rng: &mut Rng| -> [f64; 3] {
+        [0; 3].map(|_| (rng.range(-size, size) * 4.0).round() / 4.0)
+    };
     let through = on_lattice(rng, 0.5);
     let (a, b) = (far(rng), far(rng));
     // The third corner is such that the triangle runs by the grid.
