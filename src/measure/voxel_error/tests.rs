@@ -15,7 +15,11 @@ fn unit(side: usize, mode: Mode) -> Params {
 }
 
 fn lattice(side: usize) -> Lattice {
-    Lattice { lo: [0.0; 3], h: 1.0, dims: [side; 3] }
+    Lattice {
+        lo: [0.0; 3],
+        h: 1.0,
+        dims: [side; 3],
+    }
 }
 
 fn volume(side: usize, f: impl Fn(usize, usize, usize) -> bool) -> Volume {
@@ -27,7 +31,10 @@ fn volume(side: usize, f: impl Fn(usize, usize, usize) -> bool) -> Volume {
             }
         }
     }
-    Volume { frame: lattice(side).frame(), data: Data::Bits(grid) }
+    Volume {
+        frame: lattice(side).frame(),
+        data: Data::Bits(grid),
+    }
 }
 
 fn is_inside(x: usize, y: usize, z: usize) -> bool {
@@ -45,10 +52,19 @@ fn a_shell_leaks_where_a_voxel_is_missing() {
     let of = |f: &dyn Fn(usize, usize, usize) -> bool| leaks(&volume(9, f), &solid);
     assert_eq!(of(&is_shell), 0);
     // The 3 x 3 x 3 voxels within, and the missing one itself.
-    assert_eq!(of(&|x, y, z| is_shell(x, y, z) && (x, y, z) != (2, 4, 3)), 28);
-    assert_eq!(of(&|x, y, z| is_shell(x, y, z) && (x, y, z) != (4, 4, 6)), 28);
+    assert_eq!(
+        of(&|x, y, z| is_shell(x, y, z) && (x, y, z) != (2, 4, 3)),
+        28
+    );
+    assert_eq!(
+        of(&|x, y, z| is_shell(x, y, z) && (x, y, z) != (4, 4, 6)),
+        28
+    );
     // A voxel on an edge of the shell opens itself only: within, it touches by an edge.
-    assert_eq!(of(&|x, y, z| is_shell(x, y, z) && (x, y, z) != (2, 2, 4)), 1);
+    assert_eq!(
+        of(&|x, y, z| is_shell(x, y, z) && (x, y, z) != (2, 2, 4)),
+        1
+    );
     assert_eq!(of(&|_, _, _| false), 125);
     assert_eq!(of(&|_, _, _| true), 0);
 }
@@ -65,7 +81,11 @@ fn a_flood_does_not_pass_diagonal_gaps() {
     assert_eq!(leaks(&faces, &solid), edges_and_corners);
     // A wall in steps through the grid keeps its sides apart, until one of its voxels goes.
     let below = volume(9, |x, y, _| x + y < 8);
-    let wall = |gap: bool| volume(9, move |x, y, z| x + y == 8 && !(gap && (x, y, z) == (4, 4, 4)));
+    let wall = |gap: bool| {
+        volume(9, move |x, y, z| {
+            x + y == 8 && !(gap && (x, y, z) == (4, 4, 4))
+        })
+    };
     // Both sides reach the border of the grid; a box around the lower one does not.
     let boxed = |gap: bool| {
         volume(9, move |x, y, z| {
@@ -94,20 +114,29 @@ fn a_leak_is_found_around_corners_and_across_words() {
     let length = tunnel.count_set();
     assert_eq!(length, 68 + 1 + 56 + 66);
     assert_eq!(leaks(&volume(side, |x, y, z| !path(x, y, z)), &tunnel), 0);
-    assert_eq!(leaks(&volume(side, |x, y, z| !open(x, y, z)), &tunnel), length);
+    assert_eq!(
+        leaks(&volume(side, |x, y, z| !open(x, y, z)), &tunnel),
+        length
+    );
 }
 
 #[test]
 fn distances_from_and_to_the_surface_are_those_of_the_voxels() {
     // The square from 2 to 7 in the plane z = 3.25.
     let mut mesh = sheet(5.0, 5.0, 2, 2);
-    mesh.positions.iter_mut().for_each(|p| *p = [p[0] + 4.5, p[1] + 4.5, 3.25]);
+    mesh.positions
+        .iter_mut()
+        .for_each(|p| *p = [p[0] + 4.5, p[1] + 4.5, 3.25]);
     let of = |f: &dyn Fn(usize, usize, usize) -> bool, mode| {
         measure(&mesh, &volume(9, f), &unit(9, mode), &lattice(9), &Silent).expect("measures")
     };
     // One voxel, right above the square's middle.
     let one = of(&|x, y, z| (x, y, z) == (4, 4, 7), Mode::Conservative);
-    assert!((one.to_surface_max - 4.25).abs() < 1e-12, "{}", one.to_surface_max);
+    assert!(
+        (one.to_surface_max - 4.25).abs() < 1e-12,
+        "{}",
+        one.to_surface_max
+    );
     assert_eq!(one.to_surface_max, one.to_surface_mean);
     // A corner of the square is farthest from the voxel's box, whose low side is at (4, 4, 7) and
     // high side at (5, 5, 8).
@@ -119,13 +148,25 @@ fn distances_from_and_to_the_surface_are_those_of_the_voxels() {
     let wanted = (1.5f64 * 1.5 * 2.0 + 0.25 * 0.25).sqrt();
     assert!((corner.to_surface_max - wanted).abs() < 1e-12);
     // The layer that holds the square, and nothing.
-    let layer = of(&|x, y, z| z == 3 && (1..=7).contains(&x) && (1..=7).contains(&y), Mode::Conservative);
-    assert_eq!((layer.from_surface_max, layer.missed_triangles), (Some(0.0), 0));
+    let layer = of(
+        &|x, y, z| z == 3 && (1..=7).contains(&x) && (1..=7).contains(&y),
+        Mode::Conservative,
+    );
+    assert_eq!(
+        (layer.from_surface_max, layer.missed_triangles),
+        (Some(0.0), 0)
+    );
     assert!((layer.to_surface_max - (0.5f64 * 0.5 * 2.0 + 0.25 * 0.25).sqrt()).abs() < 1e-12);
     let nothing = of(&|_, _, _| false, Mode::ThreeAxis);
-    assert_eq!((nothing.to_surface_max, nothing.from_surface_max), (0.0, None));
+    assert_eq!(
+        (nothing.to_surface_max, nothing.from_surface_max),
+        (0.0, None)
+    );
     assert_eq!((nothing.missed_triangles, nothing.missed_area), (8, 1.0));
-    assert_eq!((nothing.surface_voxels, nothing.three_axis_voxels), (25, 25));
+    assert_eq!(
+        (nothing.surface_voxels, nothing.three_axis_voxels),
+        (25, 25)
+    );
     assert_eq!(nothing.conservative_voxels, 49);
     assert_eq!(nothing.leaks, None);
 }
@@ -134,14 +175,25 @@ fn distances_from_and_to_the_surface_are_those_of_the_voxels() {
 fn centres_inside_of_a_filled_model_are_on_it() {
     let cube = cuboid([2.3; 3], [6.4; 3]);
     let solid = volume(9, is_inside);
-    let params = |fill| Params { fill, ..unit(9, Mode::Conservative) };
+    let params = |fill| Params {
+        fill,
+        ..unit(9, Mode::Conservative)
+    };
     let of = |fill| measure(&cube, &solid, &params(fill), &lattice(9), &Silent).expect("measures");
     // The middle voxel's centre is 1.9 from the upper face.
     let surface = of(Fill::None);
-    assert!((surface.to_surface_max - 1.9).abs() < 1e-12, "{}", surface.to_surface_max);
+    assert!(
+        (surface.to_surface_max - 1.9).abs() < 1e-12,
+        "{}",
+        surface.to_surface_max
+    );
     // Filled, the farthest are the corners at (6.5, 6.5, 6.5).
     let filled = of(Fill::Winding);
-    assert!((filled.to_surface_max - 0.1 * 3f64.sqrt()).abs() < 1e-12, "{}", filled.to_surface_max);
+    assert!(
+        (filled.to_surface_max - 0.1 * 3f64.sqrt()).abs() < 1e-12,
+        "{}",
+        filled.to_surface_max
+    );
     assert_eq!((surface.leaks, filled.leaks), (Some(0), Some(0)));
 }
 
@@ -161,9 +213,15 @@ fn missed_triangles_are_those_without_a_voxel_of_their_own() {
     };
     assert_eq!(of(&[1, 3, 5]), (0, 0.0));
     let (count, share) = of(&[1, 5]);
-    assert!(count == 1 && (share - 1.0 / 6.0).abs() < 1e-12, "{count} {share}");
+    assert!(
+        count == 1 && (share - 1.0 / 6.0).abs() < 1e-12,
+        "{count} {share}"
+    );
     let (count, share) = of(&[3]);
-    assert!(count == 2 && (share - 5.0 / 6.0).abs() < 1e-12, "{count} {share}");
+    assert!(
+        count == 2 && (share - 5.0 / 6.0).abs() < 1e-12,
+        "{count} {share}"
+    );
     // Neighbours of their voxels do not count.
     assert_eq!(of(&[0, 2, 4, 6]).0, 3);
     // What lies outside of the grid is not missed in it.
@@ -176,7 +234,9 @@ fn open_and_cut_surfaces_have_no_leaks_to_count() {
     let params = unit(9, Mode::ThreeAxis);
     let of = |mesh: &Mesh| {
         let (made, stats) = voxelize(mesh, &params, &Silent).expect("a grid");
-        measure(mesh, &made, &params, &stats.lattice(), &Silent).expect("measures").leaks
+        measure(mesh, &made, &params, &stats.lattice(), &Silent)
+            .expect("measures")
+            .leaks
     };
     assert_eq!(of(&cuboid([2.3; 3], [6.4; 3])), Some(0));
     assert_eq!(of(&open_box([2.3; 3], [6.4; 3])), None);
@@ -189,7 +249,10 @@ fn a_sphere_reaches_the_proven_bounds() {
     let mesh = octasphere([10.137, 10.291, 10.413], 8.0, 20);
     for (mode, bound) in [(Mode::ThreeAxis, 0.5), (Mode::Conservative, 0.75f64.sqrt())] {
         let of = |storage| {
-            let params = Params { grid: storage, ..unit(21, mode) };
+            let params = Params {
+                grid: storage,
+                ..unit(21, mode)
+            };
             let (made, stats) = voxelize(&mesh, &params, &Silent).expect("a grid");
             measure(&mesh, &made, &params, &stats.lattice(), &Silent).expect("measures")
         };
@@ -199,7 +262,11 @@ fn a_sphere_reaches_the_proven_bounds() {
         assert_eq!((error.leaks, error.not_conservative), (Some(0), 0));
         match mode {
             Mode::Conservative => assert_eq!(error.from_surface_max, Some(0.0)),
-            _ => assert!(error.from_surface_max.is_some_and(|e| e > 0.05 && e <= 1.23)),
+            _ => assert!(
+                error
+                    .from_surface_max
+                    .is_some_and(|e| e > 0.05 && e <= 1.23)
+            ),
         }
         assert!(error.samples > 64 * 800);
     }
@@ -209,7 +276,11 @@ fn a_sphere_reaches_the_proven_bounds() {
 fn a_knot_of_many_voxels_does_not_leak() {
     let mesh = torus_knot(2, 3, 0.4, 288, 92);
     let made = |mode, fill| {
-        let params = Params { mode, fill, ..Params::DEFAULT };
+        let params = Params {
+            mode,
+            fill,
+            ..Params::DEFAULT
+        };
         voxelize(&mesh, &params, &Silent).expect("a grid").0
     };
     let inside = made(Mode::None, Fill::Winding);

@@ -159,9 +159,7 @@ fn perturbed(q: &Triangle, dims: [usize; 3]) -> Vec<(i32, i32, i32, i32)> {
             );
             let [x, _, _, w] = &line[0];
             let nx = dims[0] as i32;
-            let first = (0..nx)
-                .find(|i| (2 * i + 1) * w >= 2 * x)
-                .unwrap_or(nx);
+            let first = (0..nx).find(|i| (2 * i + 1) * w >= 2 * x).unwrap_or(nx);
             found.push((first, j, k, if facing == Sign::Plus { 1 } else { -1 }));
         }
     }
@@ -259,8 +257,9 @@ fn towards(p: [f64; 3], q: [f64; 3], t: f64) -> [f64; 3] {
 }
 
 fn large(rng: &mut Rng, size: f64) -> Triangle {
-    let far =
-        |rng: &mut Rng| -> [f64; 3] { [0; 3].map(|_| (rng.range(-size, size) * 4.0).round() / 4.0) };
+    let far = |rng: &mut Rng| -> [f64; 3] {
+        [0; 3].map(|_| (rng.range(-size, size) * 4.0).round() / 4.0)
+    };
     let through = on_lattice(rng, 0.5);
     let (a, b) = (far(rng), far(rng));
     // The third corner is such that the triangle runs by the grid.
