@@ -209,9 +209,6 @@ impl Border {
         let size: [u32; 3] = std::array::from_fn(|a| block.hi[a] - block.lo[a]);
         let centre: Vec3 =
             std::array::from_fn(|a| 0.5 * (f64::from(block.lo[a]) + f64::from(block.hi[a])));
-        if size == [1; 3] {
-            return Settled::Whole((self.taken(centre) + 0.5).floor() as i64);
-        }
         let edge = |index: &u32| &self.edges[*index as usize];
         let one_row = size[1] == 1 && size[2] == 1;
         if !one_row && task.near.iter().any(|e| edge(e).may_cross(block)) {
@@ -227,12 +224,12 @@ impl Border {
             }
         };
         let radius = 0.5 * length(size.map(|s| f64::from(s - 1)));
-        let share = FAR / self.edges.len() as f64;
+        let share = 0.5 * (FAR - task.slack).max(0.0) / task.near.len().max(1) as f64;
         let mut slack = task.slack + task.near.len() as f64 * ROUNDING;
         let mut bound = 0.0;
         let mut rest = Vec::with_capacity(task.near.len());
         for index in &task.near {
-            let change = edge(index).change(centre, radius);
+            let change = edge(index).change(block, centre, radius);
             if change <= share {
                 slack += change;
             } else {
@@ -245,10 +242,15 @@ impl Border {
         if low == high {
             return Settled::Whole(low as i64);
         }
+        if size == [1; 3] {
+            // What was left out on the way decides here, so nothing is.
+            return Settled::Whole((self.taken(centre) + 0.5).floor() as i64);
+        }
         let axis = (0..3).max_by_key(|a| (size[*a], 3 - *a)).unwrap_or(0);
         Settled::Split(block.halves(axis).map(|half| {
-            // So near an edge rounding could sweep it past the wrong side of a centre.
-            if bound == f64::INFINITY {
+            // So near an edge rounding could sweep it past the wrong side of a centre, unless the
+            // rows' own sides decide.
+            if bound == f64::INFINITY && !one_row {
                 return self.afresh(half);
             }
             Task {
@@ -333,12 +335,20 @@ impl Edge {
         self.times * (half_angle(a, b, b1) + half_angle(a, b1, a1)) / (2.0 * PI)
     }
 
-    /// A bound on the size of [`Edge::swept`] within `radius` of `centre`, infinite near the edge.
-    fn change(&self, centre: Vec3, radius: f64) -> f64 {
-        let distance = point_segment(centre, self.a, self.b)
+    /// A bound on the size of [`Edge::swept`] from the middle of a box to any centre in it, infinite
+    /// where the edge may run between them.
+    fn change(&self, block: &Block, centre: Vec3, radius: f64) -> f64 {
+        let to_ball = point_segment(centre, self.a, self.b)
             .distance_squared
             .sqrt()
             - radius;
+        // A row of voxels is much thinner than the ball around it.
+        let apart = |a: usize| {
+            let (low, high) = (f64::from(block.lo[a]) + 0.5, f64::from(block.hi[a]) - 0.5);
+            let below = self.a[a].min(self.b[a]) - high;
+            below.max(low - self.a[a].max(self.b[a])).max(0.0)
+        };
+        let distance = to_ball.max(length([apart(0), apart(1), apart(2)]));
         if distance <= 0.0 {
             return f64::INFINITY;
         }
