@@ -8,7 +8,7 @@
 
 use super::kernel::{self, Clip};
 use super::raster::Surface;
-use super::winding::Border;
+use super::winding::{Border, Step};
 use super::{Fill, Lattice};
 use crate::progress::Progress;
 use crate::volume::bits::BitGrid;
@@ -92,9 +92,17 @@ impl Filling {
     ) -> Self {
         let dims = lattice.dims;
         let keys = crossings(surface, dims, progress);
-        let inverted = enclosed(&keys, dims[0]) < 0;
         let [_, ty, tz] = dims.map(|d| d.div_ceil(TILE));
-        progress.stage("fill", (ty * tz) as u64);
+        progress.stage("fill", 2 * (ty * tz) as u64);
+        let steps: Vec<Vec<Step>> = (0..ty * tz)
+            .into_par_iter()
+            .map(|row| {
+                let steps = border.steps([row % ty, row / ty], dims);
+                progress.advance(1);
+                steps
+            })
+            .collect();
+        let inverted = enclosed(&keys, &steps, dims[0]) < 0;
         // Empty tile rows have no crossing, and without a border nothing else can fill them.
         let groups: Vec<&[u64]> = {
             let mut rest = keys.as_slice();
@@ -109,10 +117,9 @@ impl Filling {
         };
         let made: Vec<(Vec<Run>, u64)> = groups
             .into_par_iter()
-            .enumerate()
-            .map(|(row, keys)| {
-                let at = [row % ty, row / ty];
-                let made = tile_row(keys, at, dims, rule, border, inverted);
+            .zip(&steps)
+            .map(|(keys, steps)| {
+                let made = tile_row(keys, steps, dims[0] as u32, rule, inverted);
                 progress.advance(1);
                 made
             })
@@ -224,24 +231,29 @@ fn step(key: u64) -> i64 {
     1 - 2 * (key & 1) as i64
 }
 
-/// The sum of the crossings' winding over all voxels of the grid.
-fn enclosed(keys: &[u64], nx: usize) -> i64 {
-    keys.par_iter()
+/// The sum of the winding numbers, each rounded, over all voxels of the grid.
+fn enclosed(keys: &[u64], steps: &[Vec<Step>], nx: usize) -> i64 {
+    let crossed: i64 = keys
+        .par_iter()
         .map(|key| step(*key) * (nx as i64 - i64::from(voxel(*key))))
-        .sum()
+        .sum();
+    let length = |steps: &[Step], i: usize| {
+        let next = steps.get(i + 1).filter(|next| next.row == steps[i].row);
+        next.map_or(nx as i64, |next| i64::from(next.x)) - i64::from(steps[i].x)
+    };
+    let taken: i64 = steps
+        .par_iter()
+        .map(|steps| {
+            (0..steps.len())
+                .map(|i| steps[i].whole * length(steps, i))
+                .sum::<i64>()
+        })
+        .sum();
+    crossed - taken
 }
 
 /// The runs of one row of tiles, and the number of centres that the two rules judge differently.
-fn tile_row(
-    keys: &[u64],
-    at: [usize; 2],
-    dims: [usize; 3],
-    rule: Fill,
-    border: &Border,
-    inverted: bool,
-) -> (Vec<Run>, u64) {
-    let nx = dims[0] as u32;
-    let steps = border.steps(at, dims);
+fn tile_row(keys: &[u64], steps: &[Step], nx: u32, rule: Fill, inverted: bool) -> (Vec<Run>, u64) {
     let mut runs: Vec<Run> = Vec::new();
     let mut disagreeing = 0;
     let (mut key, mut next) = (0, 0);

@@ -7,8 +7,8 @@
 //! solid angle of the strips, in closed form per border edge. So the cost follows the length of the
 //! border and not the area of the surface, nothing is approximated by expansions, and only whether
 //! it exceeds a half-integer has to be known: whole boxes of voxels are settled at once by a bound on
-//! its gradient (Biot and Savart's law for the border as a wire), and border edges too far away to
-//! change much within a box are summed once for the box.
+//! its gradient (Biot and Savart's law for the border as a wire), and from box to smaller box only
+//! the edges near enough to change it much are followed.
 
 use super::kernel::beside;
 use super::lattice::Lattice;
@@ -20,8 +20,8 @@ use crate::volume::octree::TILE;
 use rayon::prelude::*;
 use std::f64::consts::PI;
 
-/// How much of a winding number all far edges of a box together may be off: a tenth, so that a
-/// point far from the border is settled by them.
+/// How much of a winding number all edges that are not followed may be off together: a tenth, so that
+/// a point far from the border is settled without them.
 const FAR: f64 = 0.1;
 /// Rounding of one edge's solid angle, generously.
 const ROUNDING: f64 = 1e-12;
@@ -153,12 +153,12 @@ impl Border {
             lo: lo.map(|c| c as u32),
             hi: hi.map(|c| c as u32),
         };
-        let near: Vec<u32> = (0..self.edges.len() as u32).collect();
         let mut steps = Vec::new();
-        let mut stack = vec![(block, near, 0.0, 0.0)];
-        while let Some((block, near, far, slack)) = stack.pop() {
-            match self.settle(&block, &near, far, slack) {
+        let mut stack = vec![self.afresh(block)];
+        while let Some(task) = stack.pop() {
+            match self.settle(&task) {
                 Settled::Whole(whole) => {
+                    let block = task.block;
                     for z in block.lo[2]..block.hi[2] {
                         for y in block.lo[1]..block.hi[1] {
                             let row = (z - lo[2] as u32) * TILE as u32 + (y - lo[1] as u32);
@@ -170,11 +170,7 @@ impl Border {
                         }
                     }
                 }
-                Settled::Split(halves, near, far, slack) => {
-                    let [first, second] = halves;
-                    stack.push((first, near.clone(), far, slack));
-                    stack.push((second, near, far, slack));
-                }
+                Settled::Split(halves) => stack.extend(halves),
             }
         }
         steps.sort_unstable_by_key(|s| (s.row, s.x));
@@ -192,69 +188,109 @@ impl Border {
         kept
     }
 
+    /// A box of which nothing is known.
+    fn afresh(&self, block: Block) -> Task {
+        Task {
+            block,
+            near: (0..self.edges.len() as u32).collect(),
+            known: None,
+            slack: 0.0,
+        }
+    }
+
+    /// What all strips together take at a point.
+    fn taken(&self, p: Vec3) -> f64 {
+        self.edges.iter().map(|e| e.taken(p)).sum()
+    }
+
     /// Settles a box, or says how to split it.
-    fn settle(&self, block: &Block, near: &[u32], far: f64, slack: f64) -> Settled {
+    fn settle(&self, task: &Task) -> Settled {
+        let block = &task.block;
         let size: [u32; 3] = std::array::from_fn(|a| block.hi[a] - block.lo[a]);
         let centre: Vec3 =
             std::array::from_fn(|a| 0.5 * (f64::from(block.lo[a]) + f64::from(block.hi[a])));
-        if size == [1; 3] {
-            // A single centre has all edges summed anew, in their order.
-            let sum: f64 = self.edges.iter().map(|e| e.taken(centre)).sum();
-            return Settled::Whole((sum + 0.5).floor() as i64);
-        }
-        let radius = 0.5 * length(size.map(|s| f64::from(s - 1)));
+        let edge = |index: &u32| &self.edges[*index as usize];
         let one_row = size[1] == 1 && size[2] == 1;
-        let share = FAR / self.edges.len() as f64;
-        let (mut far, mut slack) = (far, slack);
-        let (mut sum, mut bound) = (0.0, near.len() as f64 * ROUNDING);
-        let mut crossed = false;
-        let mut rest = Vec::with_capacity(near.len());
-        for index in near {
-            let edge = &self.edges[*index as usize];
-            if !one_row && edge.may_cross(block) {
-                crossed = true;
-                rest.push(*index);
-                continue;
+        if !one_row && task.near.iter().any(|e| edge(e).may_cross(block)) {
+            // The sum jumps at the strips: the box must get narrower before it says anything.
+            let axis = if size[2] > size[1] { 2 } else { 1 };
+            return Settled::Split(block.halves(axis).map(|half| self.afresh(half)));
+        }
+        let value = match task.known {
+            None => self.taken(centre),
+            Some((from, value)) => {
+                let swept = task.near.iter().map(|e| edge(e).swept(from, centre));
+                value + swept.sum::<f64>()
             }
-            let change = edge.change(centre, radius);
-            let value = edge.taken(centre);
+        };
+        let radius = 0.5 * length(size.map(|s| f64::from(s - 1)));
+        let share = 0.5 * (FAR - task.slack).max(0.0) / task.near.len().max(1) as f64;
+        let mut slack = task.slack + task.near.len() as f64 * ROUNDING;
+        let mut bound = 0.0;
+        let mut rest = Vec::with_capacity(task.near.len());
+        for index in &task.near {
+            let change = edge(index).change(block, centre, radius);
             if change <= share {
-                far += value;
                 slack += change;
             } else {
-                sum += value;
                 bound += change;
                 rest.push(*index);
             }
         }
-        if !crossed {
-            let (total, open) = (far + sum + 0.5, slack + bound);
-            let (low, high) = ((total - open).floor(), (total + open).floor());
-            if low == high {
-                return Settled::Whole(low as i64);
-            }
+        let (total, open) = (value + 0.5, slack + bound);
+        let (low, high) = ((total - open).floor(), (total + open).floor());
+        if low == high {
+            return Settled::Whole(low as i64);
         }
-        // A box that strips run through must get narrower before anything can be said of it.
-        let candidates: &[usize] = if crossed { &[1, 2] } else { &[0, 1, 2] };
-        let axis = candidates
-            .iter()
-            .copied()
-            .max_by_key(|a| (size[*a], 3 - *a))
-            .unwrap_or(0);
-        let middle = block.lo[axis] + size[axis] / 2;
-        let mut halves = [*block; 2];
-        halves[0].hi[axis] = middle;
-        halves[1].lo[axis] = middle;
-        Settled::Split(halves, rest, far, slack)
+        if size == [1; 3] {
+            // What was left out on the way decides here, so nothing is.
+            return Settled::Whole((self.taken(centre) + 0.5).floor() as i64);
+        }
+        let axis = (0..3).max_by_key(|a| (size[*a], 3 - *a)).unwrap_or(0);
+        Settled::Split(block.halves(axis).map(|half| {
+            // So near an edge rounding could sweep it past the wrong side of a centre, unless the
+            // rows' own sides decide.
+            if bound == f64::INFINITY && !one_row {
+                return self.afresh(half);
+            }
+            Task {
+                block: half,
+                near: rest.clone(),
+                known: Some((centre, value)),
+                slack,
+            }
+        }))
     }
+}
+
+/// A box to be settled, and what is known from the box it is a half of.
+struct Task {
+    block: Block,
+    /// The edges that change the sum by more than the slack within the box.
+    near: Vec<u32>,
+    /// A point and the sum of all edges there.
+    known: Option<(Vec3, f64)>,
+    /// How much the other edges change the sum from that point to any of the box, and rounding.
+    slack: f64,
 }
 
 /// What came of a box.
 enum Settled {
     /// All its centres have this number taken.
     Whole(i64),
-    /// Look at the halves, with these edges; the others are summed, up to a slack.
-    Split([Block; 2], Vec<u32>, f64, f64),
+    /// Look at the halves.
+    Split([Task; 2]),
+}
+
+impl Block {
+    /// The two halves along an axis.
+    fn halves(&self, axis: usize) -> [Block; 2] {
+        let middle = self.lo[axis] + (self.hi[axis] - self.lo[axis]) / 2;
+        let mut halves = [*self; 2];
+        halves[0].hi[axis] = middle;
+        halves[1].lo[axis] = middle;
+        halves
+    }
 }
 
 impl Edge {
@@ -267,6 +303,15 @@ impl Edge {
         if turn == 0 || lu == 0.0 || lv == 0.0 {
             return 0.0;
         }
+        // On the ray from an end the strip takes what it takes beside it, on the side to which
+        // `beside` moves the point, +y: half of the lune between the ray and the strip.
+        let on_ray = |w: Vec3| w[1] == 0.0 && w[2] == 0.0 && w[0] < 0.0;
+        for (end, other) in [(u, v), (v, u)] {
+            if on_ray(end) {
+                let lune = other[2].abs().atan2(-other[1]);
+                return self.times * lune * f64::from(turn) / (2.0 * PI);
+            }
+        }
         // Van Oosterom and Strackee (1983), with the unit vector of +x as the third corner.
         // The exact turn gives the sign, also to a volume that is rounding error or 0.
         let volume = cross(v, u)[0].abs() / (lu * lv);
@@ -274,12 +319,36 @@ impl Edge {
         self.times * volume.copysign(f64::from(turn)).atan2(cosines) / (2.0 * PI)
     }
 
-    /// A bound on how much [`Edge::taken`] changes within `radius` of `centre`, infinite near the edge.
-    fn change(&self, centre: Vec3, radius: f64) -> f64 {
-        let distance = point_segment(centre, self.a, self.b)
+    /// The share of the parallelogram that this edge sweeps when `from` moves to `to` and the edge
+    /// is seen from it.
+    ///
+    /// Summed over a closed border this is the change of the sum of [`Edge::taken`]; edge by edge it
+    /// is not, since a strip also turns with the rays that bound it, which cancel only among
+    /// neighbours. So far edges can be left out here and not there.
+    fn swept(&self, from: Vec3, to: Vec3) -> f64 {
+        if from[1] == to[1] && from[2] == to[2] {
+            // The rays stay in their lines, and the strips know on which side of the row they run.
+            return self.taken(to) - self.taken(from);
+        }
+        let [a, b] = [sub(self.a, from), sub(self.b, from)];
+        let [a1, b1] = [sub(self.a, to), sub(self.b, to)];
+        self.times * (half_angle(a, b, b1) + half_angle(a, b1, a1)) / (2.0 * PI)
+    }
+
+    /// A bound on the size of [`Edge::swept`] from the middle of a box to any centre in it, infinite
+    /// where the edge may run between them.
+    fn change(&self, block: &Block, centre: Vec3, radius: f64) -> f64 {
+        let to_ball = point_segment(centre, self.a, self.b)
             .distance_squared
             .sqrt()
             - radius;
+        // A row of voxels is much thinner than the ball around it.
+        let apart = |a: usize| {
+            let (low, high) = (f64::from(block.lo[a]) + 0.5, f64::from(block.hi[a]) - 0.5);
+            let below = self.a[a].min(self.b[a]) - high;
+            below.max(low - self.a[a].max(self.b[a])).max(0.0)
+        };
+        let distance = to_ball.max(length([apart(0), apart(1), apart(2)]));
         if distance <= 0.0 {
             return f64::INFINITY;
         }
@@ -293,6 +362,13 @@ impl Edge {
             self.a[a].min(self.b[a]) <= high && self.a[a].max(self.b[a]) >= low
         })
     }
+}
+
+/// Half the solid angle of a triangle at the origin (Van Oosterom and Strackee 1983).
+fn half_angle(a: Vec3, b: Vec3, c: Vec3) -> f64 {
+    let [la, lb, lc] = [a, b, c].map(length);
+    let cosines = la * lb * lc + dot(a, b) * lc + dot(b, c) * la + dot(c, a) * lb;
+    dot(a, cross(b, c)).atan2(cosines)
 }
 
 /// An edge of a triangle: the places of its ends, smaller first; and triangle and direction.

@@ -159,7 +159,7 @@ fn a_flat_model_has_a_grid_of_one_layer() {
 
 #[test]
 fn the_smallest_and_the_farthest_models_look_like_any_other() {
-    let mesh = tetrahedron([0.1, 0.2, 0.3], 1.0);
+    let mesh = icosphere([0.1, 0.2, 0.3], 1.0, 2);
     for mode in [Mode::ThreeAxis, Mode::Conservative] {
         let params = Params {
             fill: Fill::Winding,
@@ -175,10 +175,15 @@ fn the_smallest_and_the_farthest_models_look_like_any_other() {
         for scale in [1e-30, 1e-300, 1e200] {
             let stats = place(&|p| p.map(|c| c * scale));
             assert_eq!(stats.dims, wanted.dims);
-            assert!(stats.set_voxels.abs_diff(wanted.set_voxels) <= 8, "{scale}");
+            let found = stats.set_voxels;
+            assert!(
+                found.abs_diff(wanted.set_voxels) <= 12,
+                "{scale}: {found} for {}",
+                wanted.set_voxels
+            );
         }
         let stats = place(&|p| p.map(|c| c + 1e9));
-        assert!(stats.set_voxels.abs_diff(wanted.set_voxels) <= 8);
+        assert!(stats.set_voxels.abs_diff(wanted.set_voxels) <= 12);
         assert_eq!(stats.warnings, []);
     }
     let tiny = cuboid([0.0; 3], [1e-310; 3]);

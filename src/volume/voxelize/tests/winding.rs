@@ -126,6 +126,8 @@ fn open_boxes_fill_as_their_winding_number_says() {
             let mut mesh = mesh.clone();
             mesh.positions.iter_mut().for_each(|p| *p = place(*p));
             let stats = same("open box", &mesh, [18, 18, 18]);
+            assert_eq!(warned(&stats, "inside-out"), None);
+            assert!(stats.set_voxels > 100, "{}", stats.set_voxels);
             assert_eq!(
                 (stats.border_edges, warned(&stats, "open-surface")),
                 (Some(4), Some(4))
@@ -155,7 +157,8 @@ fn open_sheets_fill_as_their_winding_number_says() {
         let stats = same("bent sheet", &bent, [18, 19, 17]);
         assert_eq!(stats.border_edges, Some(60));
         // Behind the other face the number is the same, below zero.
-        same("bent sheet, reversed", &reversed(bent), [18, 19, 17]);
+        let other = same("bent sheet, reversed", &reversed(bent), [18, 19, 17]);
+        assert!(warned(&stats, "inside-out") != warned(&other, "inside-out"));
     }
 }
 
@@ -231,7 +234,7 @@ fn patches_are_wound_one_way_before_they_are_filled() {
             assert_eq!(stats.border_edges, Some(0));
         }
         // The same with a hole: the rest of the border still counts.
-        let upper = |mesh: Mesh| kept(mesh, |_, corners| corners[0][2] < 13.0);
+        let upper = |mesh: Mesh| kept(mesh, |_, [a, b, c]| a[2].max(b[2]).max(c[2]) < 13.0);
         check(
             "a third of an open one",
             &upper(mixed),
@@ -261,7 +264,7 @@ fn a_soup_of_triangles_fills_as_its_winding_number_says() {
             let mut rng = Rng::new(100 + seed, i);
             let p = dims.map(|d| rng.range(-4.0, d as f64 + 4.0));
             if seed % 2 == 1 {
-                p.map(|c| (2.0 * c).round() / 2.0)
+                p.map(|c: f64| (2.0 * c).round() / 2.0)
             } else {
                 p
             }
