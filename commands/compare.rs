@@ -65,7 +65,7 @@ pub enum Stats {
     /// Two meshes.
     Mesh(Box<MeshDifference>),
     /// Two volumes.
-    Volume(VolumeDifference),
+    Volume(Box<VolumeDifference>),
 }
 
 /// The report of this command.
@@ -124,5 +124,5 @@ fn volumes(job: &mut Job, a: &Volume, tolerance: Option<f64>) -> Result<Found<Pa
     let (differing, voxels) = (difference.differing, difference.voxels);
     let summary = format!("{differing} of {voxels} voxels differ");
     let accuracy = Measures::One(difference.accuracy());
-    Ok(Found::new(params, Stats::Volume(difference), summary).accuracy(accuracy))
+    Ok(Found::new(params, Stats::Volume(Box::new(difference)), summary).accuracy(accuracy))
 }

@@ -204,6 +204,15 @@ impl<'a> Job<'a> {
 
     /// Writes the result, if the user wants it.
     pub fn write_volume(&mut self, volume: &Volume) -> Result<()> {
+        if let Some(format) = self.output_format() {
+            let (needed, limit) = (io::room_to_write(volume, format), self.context.memory());
+            if needed > u128::from(limit) {
+                let [x, y, z] = volume.frame.dims;
+                let what = format!("writing {x} x {y} x {z} voxels as {}", format.name());
+                let hint = Some("write svo or vdb, which are sparse, or raise --max-memory");
+                return Err(Error::over_memory(what, needed, limit, hint));
+            }
+        }
         self.write_with(|sink, format| io::write_volume(volume, sink, format))
     }
 

@@ -93,6 +93,41 @@ fn one_voxel_that_differs_fails_the_check() {
     assert_eq!(ran.code, 0, "{}", ran.stderr);
 }
 
+/// An octree of 65536 voxels an edge with the first one set, in 248 bytes.
+fn huge_and_empty() -> Vec<u8> {
+    let mut bytes = b"SCANTLE-SVO\n".to_vec();
+    bytes.extend([1u32, 0, 16].iter().flat_map(|n| n.to_le_bytes()));
+    bytes.extend([1u64 << 16; 3].iter().flat_map(|n| n.to_le_bytes()));
+    bytes.extend(
+        [0.0f64, 0.0, 0.0, 1.0, 1.0, 1.0]
+            .iter()
+            .flat_map(|n| n.to_le_bytes()),
+    );
+    bytes.extend([1u64; 17].iter().flat_map(|n| n.to_le_bytes()));
+    bytes.extend([1; 16]);
+    bytes
+}
+
+#[test]
+fn a_sparse_grid_too_large_to_expand_is_refused_where_the_format_is_dense() {
+    let place = Workplace::new();
+    place.put("huge.svo", huge_and_empty());
+    let dense = ["nrrd", "mha", "mhd", "npy", "binvox", "vti"];
+    for format in dense {
+        let line = format!("convert huge.svo -o huge.{format} --max-memory 100MiB");
+        let ran = place.run(&line);
+        assert_eq!(ran.code, 5, "{line}: {}", ran.stderr);
+        assert!(ran.stderr.contains("sparse"), "{}", ran.stderr);
+    }
+    assert_eq!(place.names(), ["huge.svo"]);
+    let ran = place.run("convert huge.svo -o same.svo --max-memory 100MiB");
+    assert_eq!(ran.code, 0, "{}", ran.stderr);
+    let ran = place.run("convert huge.svo -o huge.vdb --max-memory 100MiB");
+    assert_eq!(ran.code, 0, "{}", ran.stderr);
+    let read = |name| fs::read(place.path(name)).expect("a file");
+    assert!(read("same.svo") == read("huge.svo"));
+}
+
 #[test]
 fn numbers_other_than_0_and_1_are_no_bits() {
     let place = Workplace::new();

@@ -282,7 +282,7 @@ pub fn write(volume: &Volume, out: &mut dyn Write) -> io::Result<()> {
 }
 
 /// Planes of one x turned at a time: the bits of a word.
-const PLANES: usize = 64;
+pub(super) const PLANES: usize = 64;
 
 /// Turns the voxels with x from `x0` to `x0 + 63` of a dense volume: y along rows, then z, then x.
 fn planes_of_slabs(volume: &Volume, x0: usize, planes: &mut BitGrid) {

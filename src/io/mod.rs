@@ -33,6 +33,7 @@ use crate::error::{Error, Fault, Result};
 use crate::mesh::{Mesh, Polygons};
 use crate::report::{Input, Output, Warning};
 use crate::volume::Volume;
+use crate::volume::bits::BitGrid;
 use format::{Format, Kind};
 use sink::Sink;
 use source::Source;
@@ -181,6 +182,25 @@ pub fn write_volume(
     }
     let output = sink.write(format, |out| writer(volume, out))?;
     Ok((vec![output], Vec::new()))
+}
+
+/// Bytes held while a volume is written, beside the volume itself: what is copied or expanded at a
+/// time. A sparse grid of large sides needs room where the format is dense.
+pub fn room_to_write(volume: &Volume, format: Format) -> u128 {
+    let dims @ [_, ny, nz] = volume.frame.dims;
+    let packed = match format {
+        Format::Svo | Format::Vdb | Format::Binvox if !volume.is_binary() => {
+            BitGrid::bytes_for(dims)
+        }
+        _ => 0,
+    };
+    let at_a_time = match format {
+        Format::Binvox => BitGrid::bytes_for([ny, nz, binvox::PLANES]),
+        Format::Svo | Format::Vdb => 0,
+        _ if volume.is_binary() => samples::slab_bytes(dims),
+        _ => 0,
+    };
+    packed + at_a_time
 }
 
 /// Why a volume cannot be held by a format, if it cannot.

@@ -296,6 +296,11 @@ fn write_numbers<T: NoUninit>(numbers: &[T], out: &mut dyn Write) -> io::Result<
 /// Slices in a slab: two layers of the bricks of an octree.
 const SLAB: usize = 8;
 
+/// Bytes of a slab of a grid.
+pub fn slab_bytes([nx, ny, nz]: [usize; 3]) -> u128 {
+    BitGrid::bytes_for([nx, ny, SLAB.min(nz)])
+}
+
 /// Calls `f(z, slab)` for each slab of up to 8 slices of bits, `z` its first slice.
 pub fn for_each_slab<E>(
     volume: &Volume,
