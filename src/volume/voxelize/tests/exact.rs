@@ -194,7 +194,7 @@ fn check(name: &str, q: &Triangle) -> usize {
         let found = collect(|set| {
             overlap(q, clip, &mut rows, &mut |x0, x1, y, z| {
                 (x0..=x1).for_each(|x| set([x, y, z]))
-            })
+            });
         });
         assert_eq!(found, within(&met, clip), "{name}: overlap {q:?} {clip:?}");
     }
