@@ -1021,11 +1021,11 @@ mod tests {
         );
         assert_eq!(
             spoilt(&|m| m[2][1] = (0, 0)),
-            "node 1: of level 2 below the root: is empty"
+            "node 1: is empty, 2 levels below the root"
         );
         assert_eq!(
             spoilt(&|m| m[3][0] = (1, 2)),
-            "node 0: of level 3 below the root: its masks contradict each other"
+            "node 0: its masks contradict each other, 3 levels below the root"
         );
         assert_eq!(
             spoilt(&|m| m.truncate(3)),
