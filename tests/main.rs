@@ -16,3 +16,4 @@ mod malformed;
 mod man;
 mod mutations;
 mod volumes;
+mod voxelize;

@@ -82,7 +82,6 @@ pub fn measure(
             ..params.clone()
         };
         voxelize::voxelize(mesh, &params, &crate::progress::Silent)
-            .map(|(volume, stats)| (volume, stats))
     };
     progress.stage("verify", 0);
     let (conservative, three_axis) = (

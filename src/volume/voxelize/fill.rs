@@ -231,7 +231,7 @@ fn step(key: u64) -> i64 {
     1 - 2 * (key & 1) as i64
 }
 
-/// The sum of the winding numbers, each rounded, over all voxels of the grid.
+/// The sum of the winding numbers, each rounded (a half up), over all voxels of the grid.
 fn enclosed(keys: &[u64], steps: &[Vec<Step>], nx: usize) -> i64 {
     let crossed: i64 = keys
         .par_iter()
@@ -245,7 +245,7 @@ fn enclosed(keys: &[u64], steps: &[Vec<Step>], nx: usize) -> i64 {
         .par_iter()
         .map(|steps| {
             (0..steps.len())
-                .map(|i| steps[i].whole * length(steps, i))
+                .map(|i| (steps[i].doubled >> 1) * length(steps, i))
                 .sum::<i64>()
         })
         .sum();
@@ -278,7 +278,7 @@ fn tile_row(keys: &[u64], steps: &[Step], nx: u32, rule: Fill, inverted: bool) -
                 key += 1;
             }
             while steps.get(next).is_some_and(|s| s.row == row && s.x <= x) {
-                taken = steps[next].whole;
+                taken = steps[next].doubled;
                 next += 1;
             }
             let until = |at: Option<u32>| at.unwrap_or(nx).min(nx);
@@ -288,12 +288,13 @@ fn tile_row(keys: &[u64], steps: &[Step], nx: u32, rule: Fill, inverted: bool) -
                     .map(|k| voxel(*k)),
             )
             .min(until(steps.get(next).filter(|s| s.row == row).map(|s| s.x)));
-            // The winding number less the border's share is above one half (below minus one half
-            // where the surface is inside out).
+            // The winding number is above one half (below minus one half where the surface is inside
+            // out); a half itself is outside.
+            let doubled = 2 * winding - taken;
             let wound = if inverted {
-                winding < taken
+                doubled <= -2
             } else {
-                winding > taken
+                doubled >= 2
             };
             if wound != odd {
                 disagreeing += u64::from(end - x);

@@ -270,10 +270,8 @@ fn wide_overlap(
                 }
                 for j in across.possible.0..=across.possible.1 {
                     let mut span = along.and(rows[j as usize]);
-                    if let Some(plane) = &plane {
-                        if !span.is_empty() {
-                            span = span.and(plane.row(j, k));
-                        }
+                    if let Some(plane) = plane.as_ref().filter(|_| !span.is_empty()) {
+                        span = span.and(plane.row(j, k));
                     }
                     settle(
                         if across.is_certain(j) {

@@ -61,7 +61,7 @@ impl Lattice {
         };
         if h < f64::MIN_POSITIVE {
             let problem = format!(
-                "the longest side, {longest}, gives voxels of {h}, below the smallest normal number"
+                "the longest side, {longest:?}, gives voxels of {h:?}, below the smallest normal number"
             );
             return Err(Error::Geometry(
                 Fault::whole(problem).with_hint("scale the model up"),

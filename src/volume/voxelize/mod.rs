@@ -182,13 +182,16 @@ impl Params {
             ));
         }
         if let Some(b) = self.bounds {
-            let text = b.map(|v| v.to_string()).join(",");
+            let text = b.map(|v| format!("{v:?}")).join(",");
             if b.iter().any(|v| !v.is_finite()) {
                 return Err(Error::parameter(
                     "bounds",
                     text,
                     "has a number that is not finite",
                 ));
+            }
+            if (0..3).any(|a| !(b[a + 3] - b[a]).is_finite()) {
+                return Err(Error::parameter("bounds", text, "an extent overflows"));
             }
             if (0..3).any(|a| b[a] > b[a + 3]) {
                 return Err(Error::parameter(

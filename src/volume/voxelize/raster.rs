@@ -91,7 +91,7 @@ impl<'a> Surface<'a> {
     }
 
     /// A primitive as a triangle, which for a segment or a point has no area.
-    #[inline]
+    #[inline(always)]
     pub fn primitive(&self, index: usize) -> Triangle {
         let at = |v: u32| self.lattice.to_grid(self.mesh.positions[v as usize]);
         let triangles = self.mesh.triangles.len();
@@ -173,17 +173,34 @@ impl<'a> Surface<'a> {
         let count = self.len();
         (0..count.div_ceil(CHUNK))
             .into_par_iter()
-            .map_init(Vec::new, |rows, chunk| {
+            .map_init(Scratch::default, |scratch, chunk| {
                 let mut counts = Counts::default();
                 let last = ((chunk + 1) * CHUNK).min(count);
-                for index in chunk * CHUNK..last {
-                    let q = self.primitive(index);
-                    let has_area = self.set(index, &q, &clip, rows, &mut |x0, x1, y, z| {
-                        let row = (z as usize * ny + y as usize) * stride;
-                        set_run_atomic(&words[row..row + stride], x0 as usize, x1 as usize);
-                    });
-                    if !has_area {
-                        counts = counts.and(self.count(index, &q));
+                // Fetching corners, deciding, and writing wait for memory in different ways; block by
+                // block each goes on while another waits.
+                for block in (chunk * CHUNK..last).step_by(BLOCK) {
+                    let indices = block..(block + BLOCK).min(last);
+                    scratch.corners.clear();
+                    scratch
+                        .corners
+                        .extend(indices.clone().map(|index| self.primitive(index)));
+                    let Scratch {
+                        corners,
+                        rows,
+                        masks,
+                    } = scratch;
+                    masks.clear();
+                    for (index, q) in indices.zip(corners.iter()) {
+                        let has_area = self.set(index, q, &clip, rows, &mut |x0, x1, y, z| {
+                            let row = (z as usize * ny + y as usize) * stride;
+                            push_run(masks, row, x0 as usize, x1 as usize);
+                        });
+                        if !has_area {
+                            counts = counts.and(self.count(index, q));
+                        }
+                    }
+                    for (word, mask) in masks.iter() {
+                        set_atomic(&words[*word], *mask);
                     }
                 }
                 progress.advance((last - chunk * CHUNK) as u64);
@@ -219,16 +236,14 @@ impl<'a> Surface<'a> {
                 parts
             })
             .collect();
-        let used = used.into_inner();
-        if used > limit {
-            let what = format!("the sparse grid of {:?} voxels", self.lattice.dims);
-            let hint = "lower --resolution, or raise --max-memory";
-            return Err(Error::over_memory(
-                what,
-                u128::from(used),
-                limit,
-                Some(hint),
-            ));
+        if used.into_inner() > limit {
+            // How much more it would be depends on when a thread noticed.
+            return Err(Error::Limit {
+                what: format!("the sparse grid of {:?} voxels", self.lattice.dims),
+                needed: format!("more than {limit} bytes"),
+                limit: format!("{limit} bytes"),
+                hint: Some("lower --resolution, or raise --max-memory".to_owned()),
+            });
         }
         drop(pairs);
         let mut parts: Vec<(u32, Part)> = made.into_iter().flatten().collect();
@@ -388,19 +403,29 @@ fn tile_rows<'a>(
         .collect()
 }
 
-/// Sets bits `x0..=x1` of a row of shared words.
-#[inline]
-fn set_run_atomic(row: &[AtomicU64], x0: usize, x1: usize) {
+/// Primitives whose corners are fetched, and whose voxels are written, together.
+const BLOCK: usize = 128;
+
+/// Working memory of a thread that fills a dense grid.
+#[derive(Default)]
+struct Scratch {
+    corners: Vec<Triangle>,
+    rows: Vec<Span>,
+    /// Words to set bits in.
+    masks: Vec<(usize, u64)>,
+}
+
+/// Adds the bits `x0..=x1` of the row that starts at a word.
+#[inline(always)]
+fn push_run(masks: &mut Vec<(usize, u64)>, row: usize, x0: usize, x1: usize) {
     let (first, last) = (x0 / 64, x1 / 64);
     let low = u64::MAX << (x0 % 64);
     let high = u64::MAX >> (63 - x1 % 64);
     if first == last {
-        set_atomic(&row[first], low & high);
+        masks.push((row + first, low & high));
     } else {
-        set_atomic(&row[first], low);
-        for word in &row[first + 1..last] {
-            set_atomic(word, u64::MAX);
-        }
-        set_atomic(&row[last], high);
+        masks.push((row + first, low));
+        masks.extend((first + 1..last).map(|word| (row + word, u64::MAX)));
+        masks.push((row + last, high));
     }
 }

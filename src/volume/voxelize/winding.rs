@@ -23,6 +23,8 @@ use std::f64::consts::PI;
 /// How much of a winding number all edges that are not followed may be off together: a tenth, so that
 /// a point far from the border is settled without them.
 const FAR: f64 = 0.1;
+/// A winding number this near to a half is one: centres in the plane of an opening.
+const TIE: f64 = 1e-9;
 /// Rounding of one edge's solid angle, generously.
 const ROUNDING: f64 = 1e-12;
 
@@ -33,8 +35,9 @@ pub struct Step {
     pub row: u32,
     /// First voxel.
     pub x: u32,
-    /// The number that the crossings must exceed for the winding number to exceed one half.
-    pub whole: i64,
+    /// Twice what is taken, rounded: to an even number, or to an odd one where it is a half-integer.
+    /// Twice the crossings less this is 2 or more where the winding number exceeds one half.
+    pub doubled: i64,
 }
 
 /// The directed border of a surface: the edges along which its triangles do not cancel.
@@ -157,7 +160,7 @@ impl Border {
         let mut stack = vec![self.afresh(block)];
         while let Some(task) = stack.pop() {
             match self.settle(&task) {
-                Settled::Whole(whole) => {
+                Settled::All(doubled) => {
                     let block = task.block;
                     for z in block.lo[2]..block.hi[2] {
                         for y in block.lo[1]..block.hi[1] {
@@ -165,7 +168,7 @@ impl Border {
                             steps.push(Step {
                                 row,
                                 x: block.lo[0],
-                                whole,
+                                doubled,
                             });
                         }
                     }
@@ -180,8 +183,8 @@ impl Border {
             let before = kept
                 .last()
                 .filter(|k| k.row == step.row)
-                .map_or(0, |k| k.whole);
-            if step.whole != before {
+                .map_or(0, |k| k.doubled);
+            if step.doubled != before {
                 kept.push(step);
             }
         }
@@ -240,11 +243,11 @@ impl Border {
         let (total, open) = (value + 0.5, slack + bound);
         let (low, high) = ((total - open).floor(), (total + open).floor());
         if low == high {
-            return Settled::Whole(low as i64);
+            return Settled::All(2 * low as i64);
         }
         if size == [1; 3] {
             // What was left out on the way decides here, so nothing is.
-            return Settled::Whole((self.taken(centre) + 0.5).floor() as i64);
+            return Settled::All(doubled(self.taken(centre)));
         }
         let axis = (0..3).max_by_key(|a| (size[*a], 3 - *a)).unwrap_or(0);
         Settled::Split(block.halves(axis).map(|half| {
@@ -274,10 +277,20 @@ struct Task {
     slack: f64,
 }
 
+/// Twice a sum, rounded to an even number, or to an odd one where it is a half-integer up to rounding.
+fn doubled(sum: f64) -> i64 {
+    let twice = (2.0 * sum).round();
+    if (2.0 * sum - twice).abs() <= TIE {
+        twice as i64
+    } else {
+        2 * (sum + 0.5).floor() as i64
+    }
+}
+
 /// What came of a box.
 enum Settled {
-    /// All its centres have this number taken.
-    Whole(i64),
+    /// All its centres have this taken; see [`Step::doubled`].
+    All(i64),
     /// Look at the halves.
     Split([Task; 2]),
 }

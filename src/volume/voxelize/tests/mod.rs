@@ -1,8 +1,6 @@
 //! Tests of the voxelizer as a library.
 
-mod counts;
 mod exact;
-mod extremes;
 mod properties;
 mod winding;
 

@@ -1,9 +1,9 @@
 //! Inputs at the edge of what there is, and limits.
 
 use super::*;
-use crate::measure::voxel_error;
-use crate::mesh::shapes::{cuboid, icosphere, tetrahedron};
-use crate::numeric::vector::Vec3;
+use scantle::measure::voxel_error;
+use scantle::mesh::shapes::{cuboid, icosphere, tetrahedron};
+use scantle::numeric::vector::Vec3;
 
 fn resolution(n: u32, mode: Mode) -> Params {
     Params {

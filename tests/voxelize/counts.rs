@@ -1,9 +1,9 @@
 //! Numbers of voxels that are known beforehand.
 
 use super::*;
-use crate::measure::voxel_error;
-use crate::mesh::shapes::{cuboid, octasphere, torus_knot};
-use crate::numeric::vector::{Vec3, add, cross, normalize, scale};
+use scantle::measure::voxel_error;
+use scantle::mesh::shapes::{cuboid, octasphere, torus_knot};
+use scantle::numeric::vector::{Vec3, add, cross, normalize, scale};
 
 /// A sphere of 100,352 triangles; they stand at most 0.003 voxels below a radius of 60 voxels.
 fn sphere(radius: f64) -> (Mesh, usize) {
@@ -216,7 +216,7 @@ fn a_sparse_sphere_takes_a_fiftieth_of_the_dense_grid() {
         0.01
     ));
     let mut file = Vec::new();
-    crate::io::svo::write(&volume, &mut file).expect("a file in memory");
+    scantle::io::svo::write(&volume, &mut file).expect("a file in memory");
     assert!(
         50 * file.len() as u64 <= stats.dense_bytes,
         "{}",
