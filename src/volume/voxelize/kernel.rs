@@ -20,6 +20,18 @@ use wide::f64x4;
 /// A triangle in grid coordinates.
 pub type Triangle = [Vec3; 3];
 
+/// The same, each corner in a vector whose fourth number is 0.
+pub type Lanes = [f64x4; 3];
+
+/// The corners of a triangle in vectors.
+#[inline(always)]
+pub fn corners(lanes: &Lanes) -> Triangle {
+    lanes.map(|lane| {
+        let [x, y, z, _] = lane.to_array();
+        [x, y, z]
+    })
+}
+
 /// A box of voxels. Nothing outside is set.
 #[derive(Debug, Clone, Copy)]
 pub struct Clip {
@@ -135,12 +147,11 @@ impl Local {
 /// Cost: in the number of rows that the triangle's bounds span, plus a constant.
 #[inline(always)]
 pub fn overlap(
-    q: &Triangle,
+    lanes: &Lanes,
     clip: &Clip,
     rows: &mut Vec<Span>,
     emit: &mut impl FnMut(i32, i32, i32, i32),
 ) -> bool {
-    let lanes = q.map(|[x, y, z]| f64x4::new([x, y, z, 0.0]));
     let one = f64x4::ONE;
     // The first and the last cell along each axis: those whose closed sides the bounds meet.
     let low = ceil4(lanes[0].fast_min(lanes[1]).fast_min(lanes[2])) - one;
@@ -156,18 +167,18 @@ pub fn overlap(
     };
     let (first, last) = (whole(low), whole(high));
     if clipped | spans.simd_gt(one).to_bitmask() & 7 == 0 {
-        if let Some((mask, has_area)) = octants::touched(&lanes, low + one) {
+        if let Some((mask, has_area)) = octants::touched(lanes, low + one) {
             pairs(mask, first, emit);
             return has_area;
         }
     } else if clipped | spans.simd_ge(f64x4::splat(octants::EDGE)).to_bitmask() & 7 == 0 {
         let size = std::array::from_fn(|a| (last[a] - first[a] + 1) as usize);
-        if let Some((mask, has_area)) = octants::cells(&lanes, low, size) {
+        if let Some((mask, has_area)) = octants::cells(lanes, low, size) {
             quads(mask, first, emit);
             return has_area;
         }
     }
-    wide_overlap(q, first, last, clip, rows, emit);
+    wide_overlap(&corners(lanes), first, last, clip, rows, emit);
     false
 }
 

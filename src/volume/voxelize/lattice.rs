@@ -6,6 +6,7 @@ use crate::numeric::vector::Vec3;
 use crate::spatial::aabb::Aabb;
 use crate::volume::Frame;
 use crate::volume::octree::MAX_DIM;
+use wide::f64x4;
 
 /// Coordinates nearer to 0 than this many voxels are 0: products of three of them then stay in the
 /// range in which the predicates are exact.
@@ -101,11 +102,19 @@ impl Lattice {
     /// A point in grid coordinates: the difference and the quotient are each rounded once.
     #[inline]
     pub fn to_grid(&self, p: Vec3) -> Vec3 {
-        let to = |a: usize| {
-            let q = (p[a] - self.lo[a]) / self.h;
-            if q.abs() < SMALLEST { 0.0 } else { q }
-        };
-        [to(0), to(1), to(2)]
+        let [x, y, z, _] = self.to_lanes()(p).to_array();
+        [x, y, z]
+    }
+
+    /// A function that brings points to grid coordinates, as vectors whose fourth number is 0.
+    #[inline(always)]
+    pub(super) fn to_lanes(&self) -> impl Fn(Vec3) -> f64x4 {
+        let [x, y, z] = self.lo;
+        let (lo, h) = (f64x4::new([x, y, z, 0.0]), f64x4::splat(self.h));
+        move |[x, y, z]| {
+            let q = (f64x4::new([x, y, z, 0.0]) - lo) / h;
+            q & q.abs().simd_ge(f64x4::splat(SMALLEST))
+        }
     }
 
     /// Checks that no coordinate of a mesh with these bounds is too far from the grid to compute with.

@@ -2,7 +2,7 @@
 
 use super::Mode;
 use super::fill::{Filling, TileState};
-use super::kernel::{self, Clip, Triangle};
+use super::kernel::{self, Clip, Lanes, Triangle};
 use super::lattice::Lattice;
 use super::span::Span;
 use crate::error::{Error, Result};
@@ -12,6 +12,7 @@ use crate::volume::bits::{BitGrid, set_atomic};
 use crate::volume::octree::{Octree, Part, TILE, Tile, tile_key};
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicU64, Ordering};
+use wide::f64x4;
 
 /// Primitives per task; fixed, so that results never follow the threads.
 const CHUNK: usize = 4096;
@@ -91,9 +92,15 @@ impl<'a> Surface<'a> {
     }
 
     /// A primitive as a triangle, which for a segment or a point has no area.
-    #[inline(always)]
+    #[inline]
     pub fn primitive(&self, index: usize) -> Triangle {
-        let at = |v: u32| self.lattice.to_grid(self.mesh.positions[v as usize]);
+        kernel::corners(&self.lanes(index))
+    }
+
+    #[inline(always)]
+    fn lanes(&self, index: usize) -> Lanes {
+        let to_grid = self.lattice.to_lanes();
+        let at = |v: u32| to_grid(self.mesh.positions[v as usize]);
         let triangles = self.mesh.triangles.len();
         if let Some(t) = self.mesh.triangles.get(index) {
             return [at(t[0]), at(t[1]), at(t[2])];
@@ -114,21 +121,22 @@ impl<'a> Surface<'a> {
     pub fn set(
         &self,
         index: usize,
-        q: &Triangle,
+        lanes: &Lanes,
         clip: &Clip,
         rows: &mut Vec<Span>,
         emit: &mut impl FnMut(i32, i32, i32, i32),
     ) -> bool {
         let axes: &[usize] = match self.mode {
             Mode::Conservative if self.is_point(index) => {
-                self.set_point(q, clip, emit);
+                self.set_point(&kernel::corners(lanes), clip, emit);
                 &[]
             }
-            Mode::Conservative => return kernel::overlap(q, clip, rows, emit),
+            Mode::Conservative => return kernel::overlap(lanes, clip, rows, emit),
             Mode::ThreeAxis => &[0, 1, 2],
             Mode::Z => &[2],
             Mode::None => &[],
         };
+        let q = &kernel::corners(lanes);
         for axis in axes {
             kernel::columns(q, *axis, self.lattice.dims, clip, &mut |[x, y, z]| {
                 emit(x, x, y, z)
@@ -154,8 +162,9 @@ impl<'a> Surface<'a> {
     }
 
     #[inline]
-    fn count(&self, index: usize, q: &Triangle) -> Counts {
-        if index < self.mesh.triangles.len() && kernel::is_degenerate(q, self.reach) {
+    fn count(&self, index: usize, lanes: &Lanes) -> Counts {
+        let is_triangle = index < self.mesh.triangles.len();
+        if is_triangle && kernel::is_degenerate(&kernel::corners(lanes), self.reach) {
             Counts {
                 degenerate: 1,
                 first: Some(index as u64),
@@ -183,7 +192,7 @@ impl<'a> Surface<'a> {
                     scratch.corners.clear();
                     scratch
                         .corners
-                        .extend(indices.clone().map(|index| self.primitive(index)));
+                        .extend(indices.clone().map(|index| self.lanes(index)));
                     let Scratch {
                         corners,
                         rows,
@@ -270,11 +279,11 @@ impl<'a> Surface<'a> {
                 let mut counts = Counts::default();
                 let last = ((chunk + 1) * CHUNK).min(count);
                 for index in chunk * CHUNK..last {
-                    let q = self.primitive(index);
-                    counts = counts.and(self.count(index, &q));
+                    let lanes = self.lanes(index);
+                    counts = counts.and(self.count(index, &lanes));
                     // Scaling by a power of two is exact, so a tile is found by the same closed test
                     // as a voxel, and no voxel of a tile can be missed.
-                    let scaled = q.map(|p| p.map(|c| c / TILE as f64));
+                    let scaled = lanes.map(|lane| lane * f64x4::splat(1.0 / TILE as f64));
                     kernel::overlap(&scaled, &clip, rows, &mut |x0, x1, y, z| {
                         for x in x0..=x1 {
                             let tile = (z as u64) << 20 | (y as u64) << 10 | x as u64;
@@ -363,8 +372,8 @@ impl<'a> Surface<'a> {
         let Worker { tile, rows } = worker;
         for pair in group {
             let index = (pair & 0xffff_ffff) as usize;
-            let q = self.primitive(index);
-            self.set(index, &q, &clip, rows, &mut |x0, x1, y, z| {
+            let lanes = self.lanes(index);
+            self.set(index, &lanes, &clip, rows, &mut |x0, x1, y, z| {
                 let within = |c: i32, a: usize| (c - lo[a]) as usize;
                 tile.set_run(within(x0, 0), within(x1, 0), within(y, 1), within(z, 2));
             });
@@ -409,7 +418,7 @@ const BLOCK: usize = 128;
 /// Working memory of a thread that fills a dense grid.
 #[derive(Default)]
 struct Scratch {
-    corners: Vec<Triangle>,
+    corners: Vec<Lanes>,
     rows: Vec<Span>,
     /// Words to set bits in.
     masks: Vec<(usize, u64)>,

@@ -190,9 +190,10 @@ fn check(name: &str, q: &Triangle) -> usize {
     ];
     let met = boxes(q, DIMS, 1);
     let mut rows: Vec<Span> = Vec::new();
+    let lanes = q.map(|[x, y, z]| wide::f64x4::new([x, y, z, 0.0]));
     for clip in &clips {
         let found = collect(|set| {
-            overlap(q, clip, &mut rows, &mut |x0, x1, y, z| {
+            overlap(&lanes, clip, &mut rows, &mut |x0, x1, y, z| {
                 (x0..=x1).for_each(|x| set([x, y, z]))
             });
         });
