@@ -305,14 +305,17 @@ fn parameters_out_of_range_are_refused_with_the_option() {
             },
             "--pad 70000: ",
         ),
-        (bounds([0.0; 6]), "--bounds 0,0,0,0,0,0: has no extent"),
+        (
+            bounds([0.0; 6]),
+            "--bounds 0.0,0.0,0.0,0.0,0.0,0.0: has no extent",
+        ),
         (
             bounds([0.0, 0.0, 2.0, 1.0, 1.0, 1.0]),
-            "--bounds 0,0,2,1,1,1: the lower corner",
+            "--bounds 0.0,0.0,2.0,1.0,1.0,1.0: the lower corner",
         ),
         (
             bounds([0.0, 0.0, 0.0, 1.0, f64::INFINITY, 1.0]),
-            "--bounds 0,0,0,1,inf,1: has a number",
+            "--bounds 0.0,0.0,0.0,1.0,inf,1.0: has a number",
         ),
         (
             Params {
