@@ -102,13 +102,13 @@ impl Lattice {
     /// A point in grid coordinates: the difference and the quotient are each rounded once.
     #[inline]
     pub fn to_grid(&self, p: Vec3) -> Vec3 {
-        let [x, y, z, _] = self.to_lanes()(p).to_array();
+        let [x, y, z, _] = self.in_lanes()(p).to_array();
         [x, y, z]
     }
 
     /// A function that brings points to grid coordinates, as vectors whose fourth number is 0.
     #[inline(always)]
-    pub(super) fn to_lanes(&self) -> impl Fn(Vec3) -> f64x4 {
+    pub(super) fn in_lanes(&self) -> impl Fn(Vec3) -> f64x4 {
         let [x, y, z] = self.lo;
         let (lo, h) = (f64x4::new([x, y, z, 0.0]), f64x4::splat(self.h));
         move |[x, y, z]| {

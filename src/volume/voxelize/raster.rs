@@ -99,7 +99,7 @@ impl<'a> Surface<'a> {
 
     #[inline(always)]
     fn lanes(&self, index: usize) -> Lanes {
-        let to_grid = self.lattice.to_lanes();
+        let to_grid = self.lattice.in_lanes();
         let at = |v: u32| to_grid(self.mesh.positions[v as usize]);
         let triangles = self.mesh.triangles.len();
         if let Some(t) = self.mesh.triangles.get(index) {
