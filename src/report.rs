@@ -1,7 +1,7 @@
 //! The report every command makes: one envelope, one vocabulary.
 
 use schemars::JsonSchema;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 /// The version of the envelope. Adding a field keeps it; renaming or removing one raises it.
 pub const SCHEMA: u32 = 1;
@@ -37,7 +37,7 @@ pub struct Report<P, R> {
 }
 
 /// A file that was read.
-#[derive(Debug, Clone, Serialize, JsonSchema)]
+#[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
 pub struct Input {
     /// As given on the command line; `-` is standard input.
     pub path: String,
@@ -53,7 +53,7 @@ pub struct Input {
 }
 
 /// What a file holds.
-#[derive(Debug, Clone, Default, PartialEq, Serialize, JsonSchema)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Content {
     /// Vertices of a mesh.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -82,7 +82,7 @@ pub struct Content {
 }
 
 /// A file that was written.
-#[derive(Debug, Clone, Serialize, JsonSchema)]
+#[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
 pub struct Output {
     /// Where; `-` is standard output.
     pub path: String,
@@ -95,7 +95,7 @@ pub struct Output {
 }
 
 /// One measure of the error made, or several.
-#[derive(Debug, Clone, Serialize, JsonSchema)]
+#[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
 #[serde(untagged)]
 pub enum Measures {
     /// The only one.
@@ -105,7 +105,7 @@ pub enum Measures {
 }
 
 /// One measure of the error made.
-#[derive(Debug, Clone, Serialize, JsonSchema)]
+#[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
 pub struct Accuracy {
     /// What is measured.
     pub measure: String,
@@ -122,7 +122,7 @@ pub struct Accuracy {
 }
 
 /// How much of the full model was built.
-#[derive(Debug, Clone, Serialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Modelled {
     /// What is counted.
     pub unit: String,
@@ -155,7 +155,7 @@ impl Modelled {
 }
 
 /// Something that looks wrong but can be worked with.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub struct Warning {
     /// Stable name for programs: `degenerate-triangles`.
     pub code: String,
@@ -214,7 +214,7 @@ impl Tally {
 }
 
 /// What varies from run to run.
-#[derive(Debug, Clone, Serialize, JsonSchema)]
+#[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
 pub struct Run {
     /// Seconds from start to report.
     pub wall_s: f64,
@@ -229,7 +229,7 @@ pub struct Run {
 }
 
 /// One step of a run.
-#[derive(Debug, Clone, Serialize, JsonSchema)]
+#[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
 pub struct Stage {
     /// `read`, the algorithm's own steps, `write`.
     pub name: String,

@@ -5,5 +5,6 @@ pub mod mesh_distance;
 mod surface;
 #[cfg(test)]
 mod test_shapes;
+pub mod tradeoff;
 pub mod volume_difference;
 pub mod voxel_error;

@@ -16,10 +16,12 @@ mod octants;
 mod pyramid;
 mod raster;
 mod span;
+mod trade;
 mod winding;
 
 pub use kernel::{Triangle, touches};
 pub use lattice::Lattice;
+pub use trade::TRADE;
 
 use super::bits::BitGrid;
 use super::octree::{self, Census};
@@ -441,7 +443,7 @@ fn warnings(
 }
 
 impl Stats {
-    /// Proven bounds on the error, none of them measured.
+    /// Proven bounds on the error, none of them measured; the last is the one that [`TRADE`] names.
     pub fn bounds(&self) -> Vec<Accuracy> {
         let (to_surface, by) = match self.mode {
             Mode::Conservative => (
@@ -461,9 +463,9 @@ impl Stats {
                 "no bound: what lies between the lines through the centres is missed",
             ),
         };
-        let measure = |measure: &str, bound, reference: &str| Accuracy {
+        let measure = |measure: &str, unit: &str, bound, reference: &str| Accuracy {
             measure: measure.to_owned(),
-            unit: "voxel".to_owned(),
+            unit: unit.to_owned(),
             bound,
             reached: None,
             reference: reference.to_owned(),
@@ -472,13 +474,23 @@ impl Stats {
         vec![
             measure(
                 "largest distance from the centre of a set voxel to the model",
+                "voxel",
                 to_surface,
                 by,
             ),
             measure(
                 "largest distance from the surface to the nearest set voxel",
+                "voxel",
                 missed,
                 why,
+            ),
+            measure(
+                trade::TWO_SIDED.name,
+                trade::TWO_SIDED.unit,
+                to_surface
+                    .zip(missed)
+                    .map(|(there, back)| f64::max(there, back) * self.spacing[0]),
+                "the larger of both distances above, times the edge of a voxel",
             ),
         ]
     }
