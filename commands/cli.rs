@@ -2,7 +2,9 @@
 
 use crate::exit::Exit;
 use crate::streams::say;
-use crate::{compare, completions, convert, formats, info, man, schema, tradeoff, voxelize};
+use crate::{
+    compare, completions, convert, formats, info, man, schema, stability, tradeoff, voxelize,
+};
 use clap::error::ErrorKind;
 use clap::{Arg, CommandFactory, FromArgMatches, Parser, Subcommand};
 use std::ffi::OsString;
@@ -27,6 +29,7 @@ pub enum Command {
     Compare(compare::Args),
     Convert(convert::Args),
     Tradeoff(Box<tradeoff::Args>),
+    Stability(Box<stability::Args>),
     Formats(formats::Args),
     Schema(schema::Args),
     Completions(completions::Args),
@@ -37,7 +40,7 @@ pub enum Command {
 const GROUPS: &[(&str, &[&str])] = &[
     ("Mesh to volume", &["voxelize"]),
     ("Any file", &["info", "convert", "compare"]),
-    ("Any command", &["tradeoff"]),
+    ("Any command", &["tradeoff", "stability"]),
     (
         "About scantle",
         &["formats", "schema", "completions", "help"],
@@ -93,7 +96,7 @@ fn grouped(command: &clap::Command) -> String {
 }
 
 /// The commands that run another one, whose words they have among their own.
-const WRAPPING: &[&str] = &["tradeoff"];
+const WRAPPING: &[&str] = &["tradeoff", "stability"];
 
 /// Puts the own options of a command that runs another one first, so that they may stand anywhere:
 /// `tradeoff OWN -- COMMAND REST`. The words of other commands stay as they are.

@@ -9,6 +9,7 @@ mod destination;
 mod exit;
 mod job;
 mod machine;
+mod places;
 mod progress;
 mod runs;
 mod shared;
@@ -25,6 +26,7 @@ mod formats;
 mod info;
 mod man;
 mod schema;
+mod stability;
 mod tradeoff;
 mod voxelize;
 
@@ -47,6 +49,7 @@ fn run(command: &Command) -> Exit {
         Command::Compare(args) => compare::run(args),
         Command::Convert(args) => convert::run(args),
         Command::Tradeoff(args) => tradeoff::run(args),
+        Command::Stability(args) => stability::run(args),
         Command::Formats(args) => formats::run(args),
         Command::Schema(args) => schema::run(args),
         Command::Completions(args) => completions::run(args),

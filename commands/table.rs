@@ -1,5 +1,7 @@
 //! Tables: aligned for people, comma-separated for programs.
 
+use serde_json::Value;
+
 /// Rows of text under headings.
 #[derive(Debug, Default)]
 pub struct Table {
@@ -58,17 +60,6 @@ impl Table {
         }
         text
     }
-
-    /// As a table in Markdown.
-    pub fn markdown(&self) -> String {
-        let line = |cells: &[String]| {
-            let cells: Vec<String> = cells.iter().map(|c| c.replace('|', "\\|")).collect();
-            format!("| {} |\n", cells.join(" | "))
-        };
-        let rule = format!("|{}\n", "---|".repeat(self.headings.len()));
-        let rows: String = self.rows.iter().map(|row| line(row)).collect();
-        line(&self.headings) + &rule + &rows
-    }
 }
 
 fn csv_cell(cell: &str) -> String {
@@ -76,6 +67,15 @@ fn csv_cell(cell: &str) -> String {
         format!("\"{}\"", cell.replace('"', "\"\""))
     } else {
         cell.to_owned()
+    }
+}
+
+/// A value of a report in a cell: words without quotes, nothing for null.
+pub fn plain(value: &Value) -> String {
+    match value {
+        Value::Null => String::new(),
+        Value::String(text) => text.clone(),
+        other => other.to_string(),
     }
 }
 

@@ -26,6 +26,10 @@ pub const TABLE: &[(&str, Declared)] = &[
     ),
     ("info", Declared::None("it counts, exactly")),
     ("tradeoff", Declared::None("it measures that of others")),
+    (
+        "stability",
+        Declared::None("it measures the drift of others"),
+    ),
     ("formats", Declared::None("it reads no data")),
     ("schema", Declared::None("it reads no data")),
     ("completions", Declared::None("it reads no data")),

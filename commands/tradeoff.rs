@@ -3,21 +3,19 @@
 mod result;
 mod vary;
 
-use crate::destination::{check_folder, refuse_overlap};
 use crate::exit::Exit;
 use crate::machine::Moment;
+use crate::places::Places;
 use crate::progress::{self, Recorder};
 use crate::runs::{self, Document, Runs};
 use crate::shared::{Wrapping, named, not_negative, positive, size};
-use crate::streams::{print, say, show};
-use crate::words;
+use crate::streams::{say, show};
 use crate::wrapped::Wrapped;
 use clap::value_parser;
 use result::{Asked, Stats};
 use scantle::error::Result;
-use scantle::io::sink::Sink;
 use scantle::measure::tradeoff::{self, Choice, Cost, Failed, Limits, Ran, Row, Status};
-use scantle::report::{Input, Output, SCHEMA};
+use scantle::report::Input;
 use std::time::Instant;
 use vary::Knobs;
 
@@ -90,7 +88,7 @@ pub fn run(args: &Args) -> Result<Exit> {
         Ok(ready) => ready,
         Err(why) => return Ok(runs::refuse("tradeoff", &why)),
     };
-    let places = Places::new(&args.wrapping, &wrapped)?;
+    let places = Places::new(&args.wrapping, &wrapped.inputs)?;
     let params = tradeoff::Params {
         repeat: args.repeat,
         budget_s: args.budget,
@@ -109,13 +107,9 @@ pub fn run(args: &Args) -> Result<Exit> {
     if !talk.quiet {
         show(&result::shown(&stats).aligned());
     }
-    let mut output = Vec::new();
-    if let Some(sink) = &places.csv {
-        let table = result::exported(&stats).csv();
-        output.push(sink.write_as("csv", |out| out.write_all(&table))?);
-    }
+    let output = places.write_csv(&result::exported(&stats))?;
     let exit = judge(&stats, &rows, choice, &limits, talk.quiet);
-    deliver(&places, asked, stats, input, output)?;
+    places.deliver("tradeoff", asked, stats, input, output)?;
     Ok(exit)
 }
 
@@ -152,34 +146,6 @@ fn measure(
     (rows, input)
 }
 
-/// Where results go.
-struct Places {
-    csv: Option<Sink>,
-    report: Sink,
-}
-
-impl Places {
-    /// Errs, before any work, where two results would go to one place or over an input, or a folder
-    /// is not there.
-    fn new(wrapping: &Wrapping, wrapped: &Wrapped) -> Result<Self> {
-        let places = Places {
-            csv: wrapping.csv.as_deref().map(Sink::new),
-            report: Sink::new(wrapping.report.report.as_deref().unwrap_or("-")),
-        };
-        let written: Vec<_> = places
-            .csv
-            .iter()
-            .map(|sink| ("csv", sink))
-            .chain([("report", &places.report)])
-            .collect();
-        refuse_overlap(&wrapped.inputs, &written)?;
-        written
-            .iter()
-            .try_for_each(|(_, sink)| check_folder(sink))?;
-        Ok(places)
-    }
-}
-
 /// Says what was chosen, or why nothing was; the exit code that it means.
 fn judge(stats: &Stats, rows: &[Row], choice: Choice, limits: &Limits, quiet: bool) -> Exit {
     if rows.iter().all(|row| row.status == Status::Failed) {
@@ -210,35 +176,5 @@ fn judge(stats: &Stats, rows: &[Row], choice: Choice, limits: &Limits, quiet: bo
             ));
             Exit::CheckFailed
         }
-    }
-}
-
-/// Writes the report.
-fn deliver(
-    places: &Places,
-    parameters: Asked,
-    result: Stats,
-    input: Vec<Input>,
-    output: Vec<Output>,
-) -> Result<()> {
-    let report = Report {
-        schema: SCHEMA,
-        scantle: env!("CARGO_PKG_VERSION").to_owned(),
-        command: "tradeoff".to_owned(),
-        input,
-        output,
-        parameters,
-        result,
-        accuracy: None,
-        modelled: None,
-        warnings: Vec::new(),
-        run: None,
-    };
-    let document = words::json(&report, true);
-    match &places.report {
-        Sink::Stdout => print(&document),
-        sink => sink
-            .write_as("json", |out| out.write_all(&document))
-            .map(|_| ()),
     }
 }

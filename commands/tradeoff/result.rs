@@ -1,7 +1,7 @@
 //! What is reported of a grid: JSON, and tables.
 
 use super::vary::Knobs;
-use crate::table::{Table, bytes, short};
+use crate::table::{Table, bytes, plain, short};
 use crate::words;
 use crate::wrapped::Wrapped;
 use scantle::measure::tradeoff::{Choice, Limits, Params, Row, Spread, Status};
@@ -180,13 +180,6 @@ impl Setting {
     }
 }
 
-/// A value without the quotes that JSON gives a word.
-fn plain(value: &Value) -> String {
-    value
-        .as_str()
-        .map_or_else(|| value.to_string(), str::to_owned)
-}
-
 /// The table for people.
 pub fn shown(stats: &Stats) -> Table {
     let knobs = stats.rows.first().map(|row| &row.setting);
@@ -253,10 +246,7 @@ pub fn exported(stats: &Stats) -> Table {
     headings.extend(figures.map(str::to_owned));
     let rows = stats.rows.iter().map(|row| {
         let mut cells: Vec<String> = row.setting.values().map(plain).collect();
-        let json = |value: Value| match value {
-            Value::Null => String::new(),
-            value => plain(&value),
-        };
+        let json = |value: Value| plain(&value);
         let spread = |s: Option<Spread>| [s.map(|s| s.median), s.map(|s| s.min), s.map(|s| s.max)];
         let figures = [row.error, row.bound].into_iter();
         let figures = figures.chain(spread(row.wall_s)).chain(spread(row.cpu_s));

@@ -2,6 +2,7 @@
 
 mod hausdorff;
 pub mod mesh_distance;
+pub mod stability;
 mod surface;
 #[cfg(test)]
 mod test_shapes;
