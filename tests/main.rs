@@ -15,5 +15,7 @@ mod licences;
 mod malformed;
 mod man;
 mod mutations;
+mod properties;
+mod trade;
 mod volumes;
 mod voxelize;

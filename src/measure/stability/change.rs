@@ -52,20 +52,21 @@ pub struct Rounding {
     pub max: f64,
     /// The same over the longest side of the mesh's box.
     pub relative: f64,
-    /// The most that a coordinate changed, in units of its last place.
+    /// The most that a coordinate changed, in units of the last place of the mesh's largest.
     pub ulps: f64,
 }
 
 impl Rounding {
     fn between(from: &Mesh, to: &[Vec3]) -> Self {
         let mut found = Rounding::default();
+        let all = from.positions.as_flattened().iter();
+        let largest = all.fold(0.0f64, |most, c| most.max(c.abs()));
+        let ulp = largest.next_up() - largest;
         for (a, b) in from.positions.iter().zip(to) {
             let moved = sub(*b, *a);
             found.max = found.max.max(length(moved));
-            for (was, by) in a.iter().zip(moved) {
-                let ulp = was.abs().next_up() - was.abs();
-                found.ulps = found.ulps.max(by.abs() / ulp);
-            }
+            let most = moved.iter().fold(0.0f64, |most, c| most.max(c.abs()));
+            found.ulps = found.ulps.max(most / ulp);
         }
         found.relative = found.max / extent(from);
         found

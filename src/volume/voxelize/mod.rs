@@ -6,8 +6,8 @@
 //! last slice holds one depth only; here voxels are cubes, the lower face of each belongs to it, and
 //! the upper face of the grid to the last voxel. Conservative voxelization, to which the paper only
 //! points, is the default. What "exact" means: a vertex is brought to grid coordinates by one
-//! subtraction and one division, each rounded to nearest; all that follows is decided as rational
-//! arithmetic would decide it.
+//! difference from a point that moves with the model, one sum and one division, each rounded to
+//! nearest; all that follows is decided as rational arithmetic would decide it.
 
 mod fill;
 mod kernel;
@@ -276,6 +276,8 @@ pub struct Stats {
     /// What looks wrong.
     #[serde(skip)]
     pub warnings: Vec<Warning>,
+    #[serde(skip)]
+    lattice: Lattice,
 }
 
 /// The voxels that a mesh sets.
@@ -371,7 +373,7 @@ fn describe(
     Stats {
         dims: lattice.dims.map(|d| d as u64),
         spacing: [lattice.h; 3],
-        origin: lattice.lo,
+        origin: lattice.origin(),
         mode: params.mode,
         fill: params.fill,
         set_voxels,
@@ -388,6 +390,7 @@ fn describe(
         octree_nodes: census.made(),
         held_bytes,
         warnings: warnings(mesh, params, counts, inside.as_ref()),
+        lattice: *lattice,
     }
 }
 
@@ -497,11 +500,7 @@ impl Stats {
 
     /// The grid the voxels stand in.
     pub fn lattice(&self) -> Lattice {
-        Lattice {
-            lo: self.origin,
-            h: self.spacing[0],
-            dims: self.dims.map(|d| d as usize),
-        }
+        self.lattice
     }
 
     /// Octree nodes made against the nodes of the full tree.
