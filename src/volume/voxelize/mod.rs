@@ -9,6 +9,7 @@
 //! subtraction and one division, each rounded to nearest; all that follows is decided as rational
 //! arithmetic would decide it.
 
+mod dense;
 mod fill;
 mod kernel;
 mod lattice;
