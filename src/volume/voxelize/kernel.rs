@@ -11,8 +11,8 @@
 //! * [`crossings`]: like columns along x, but each line is met by exactly one of the triangles that
 //!   share an edge, for inside and outside.
 
-use super::octants;
-use super::span::{Edges, Plane, Sample, Span, ceil, ceil4, floor, floor4, side};
+use super::octants::{self, Small};
+use super::span::{Edges, Plane, Sample, Span, ceil, ceil4, floor, floor4, nearest_index, side};
 use crate::numeric::predicates::{orient2d, orient3d};
 use crate::numeric::vector::{Vec3, cross, sub};
 use wide::f64x4;
@@ -140,8 +140,103 @@ impl Local {
     }
 }
 
+/// How many cells a triangle's closed bounds meet, as far as it decides how its voxels are found.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Extent {
+    /// None in the clip.
+    Outside,
+    /// At most two along each axis, all in the clip.
+    Pairs,
+    /// At most [`octants::EDGE`] along each axis, all in the clip.
+    Few,
+    /// More, or not all of them in the clip, or rounding could make them more.
+    Many,
+}
+
+/// Where a triangle is in the grid.
+#[derive(Clone, Copy)]
+pub struct Place {
+    /// The cells of its closed bounds.
+    pub extent: Extent,
+    /// The first of them; of no meaning for [`Extent::Many`].
+    pub first: [i32; 3],
+    /// How many there are after the first along each axis.
+    spans: [i32; 3],
+    /// The triangle, seen from the first.
+    pub small: Small,
+}
+
+/// Coordinates from the grid's, where rounded differently, are off by less than this many voxels.
+const NEAR: f64 = 1e-9;
+/// Up to this many corners inside of a triangle's bounds are cheaper to look at than rows are to solve.
+const FEW: usize = 36;
+
+impl Place {
+    /// Where the triangle is. Within a grid of 2^16 voxels, `lanes` may be off by [`NEAR`].
+    #[inline(always)]
+    pub fn new(lanes: &Lanes, clip: &Clip) -> Self {
+        let (one, half) = (f64x4::ONE, f64x4::splat(0.5));
+        let least = lanes[0].fast_min(lanes[1]).fast_min(lanes[2]);
+        let greatest = lanes[0].fast_max(lanes[1]).fast_max(lanes[2]);
+        // The first and the last cell along each axis: away from the planes between cells, those
+        // whose closed sides the bounds meet are those that hold their ends.
+        let (low, first) = nearest_index(least - half);
+        let (high, last) = nearest_index(greatest - half);
+        let off = (least - low - half)
+            .abs()
+            .fast_max((greatest - high - half).abs());
+        let near = off.simd_gt(f64x4::splat(0.5 - NEAR));
+        let out = low.simd_gt(clip.high) | high.simd_lt(clip.low);
+        let clipped = near | low.simd_lt(clip.low) | high.simd_gt(clip.high);
+        let spans = high - low;
+        let above = |limit: f64x4| spans.simd_gt(limit).to_bitmask() & 7 != 0;
+        let extent = if (clipped | out).to_bitmask() & 7 != 0 {
+            let surely_out = near.to_bitmask() & 7 == 0 && out.to_bitmask() & 7 != 0;
+            [Extent::Many, Extent::Outside][usize::from(surely_out)]
+        } else {
+            let more = usize::from(above(one)) + usize::from(above(f64x4::splat(MOST_SPAN)));
+            [Extent::Pairs, Extent::Few, Extent::Many][more]
+        };
+        Place {
+            extent,
+            first,
+            spans: std::array::from_fn(|a| last[a].wrapping_sub(first[a])),
+            small: Small::new(lanes, low),
+        }
+    }
+
+    /// Cells along each axis.
+    #[inline(always)]
+    pub fn size(&self) -> [usize; 3] {
+        self.spans.map(|s| s as usize + 1)
+    }
+
+    /// A number below [`SHAPES`] that is the same for triangles of the same size.
+    #[inline(always)]
+    pub fn shape(&self) -> usize {
+        let [x, y, z] = self.spans.map(|s| s as usize);
+        x + octants::EDGE * (y + octants::EDGE * z)
+    }
+
+    /// The voxels of a triangle of at most [`Extent::Few`], as [`Small::cells`] has them, and whether it
+    /// surely has an area; none where it has too many corners within its bounds or only exact
+    /// arithmetic can tell.
+    #[inline(always)]
+    pub fn cells(&self) -> Option<([u64; octants::EDGE], bool)> {
+        let corners = self.spans.map(|s| s.max(1) as usize);
+        if corners.iter().product::<usize>() > FEW {
+            return None;
+        }
+        self.small.cells(self.size(), octants::EDGE)
+    }
+}
+
+/// The number of sizes that a triangle of at most [`Extent::Few`] can have.
+pub const SHAPES: usize = octants::EDGE * octants::EDGE * octants::EDGE;
+/// The largest difference of the cells along an axis for [`Extent::Few`].
+const MOST_SPAN: f64 = (octants::EDGE - 1) as f64;
+
 /// Calls `emit(x0, x1, y, z)` for every run of voxels whose closed cubes the closed triangle meets.
-/// Returns whether it noticed in passing that the triangle has an area.
 ///
 /// Triangles without area are met as the segments or points they are. `rows` is working memory.
 /// Cost: in the number of rows that the triangle's bounds span, plus a constant.
@@ -151,48 +246,50 @@ pub fn overlap(
     clip: &Clip,
     rows: &mut Vec<Span>,
     emit: &mut impl FnMut(i32, i32, i32, i32),
-) -> bool {
-    let one = f64x4::ONE;
-    // The first and the last cell along each axis: those whose closed sides the bounds meet.
-    let low = ceil4(lanes[0].fast_min(lanes[1]).fast_min(lanes[2])) - one;
-    let high = floor4(lanes[0].fast_max(lanes[1]).fast_max(lanes[2]));
-    if (low.simd_gt(clip.high) | high.simd_lt(clip.low)).to_bitmask() != 0 {
-        return false;
-    }
-    let clipped = (low.simd_lt(clip.low) | high.simd_gt(clip.high)).to_bitmask() & 7;
-    let spans = high - low;
-    let whole = |c: f64x4| {
-        let [x, y, z, _] = c.to_array();
-        [x as i32, y as i32, z as i32]
+) {
+    let place = Place::new(lanes, clip);
+    let done = match place.extent {
+        Extent::Outside => true,
+        Extent::Pairs => {
+            let seen = place.small.pairs();
+            if !seen.doubtful {
+                pairs(seen.octants, place.first, emit);
+            }
+            !seen.doubtful
+        }
+        Extent::Few => match place.cells() {
+            Some((cells, _)) => {
+                slices(&cells, place.first, emit);
+                true
+            }
+            None => false,
+        },
+        Extent::Many => false,
     };
-    let (first, last) = (whole(low), whole(high));
-    if clipped | spans.simd_gt(one).to_bitmask() & 7 == 0 {
-        if let Some((mask, has_area)) = octants::touched(lanes, low + one) {
-            pairs(mask, first, emit);
-            return has_area;
-        }
-    } else if clipped | spans.simd_ge(f64x4::splat(octants::EDGE)).to_bitmask() & 7 == 0 {
-        let size = std::array::from_fn(|a| (last[a] - first[a] + 1) as usize);
-        if let Some((mask, has_area)) = octants::cells(lanes, low, size) {
-            quads(mask, first, emit);
-            return has_area;
-        }
+    if !done {
+        overlap_exact(lanes, clip, rows, emit);
     }
-    wide_overlap(&corners(lanes), first, last, clip, rows, emit);
-    false
 }
 
-/// [`overlap`] for triangles that span many voxels, leave the clip, or pass too near to a corner;
-/// `first` and `last` are the cells of their bounds.
+/// [`overlap`] for triangles that span many voxels, leave the clip, or pass too near to a corner.
 #[inline(never)]
-fn wide_overlap(
-    q: &Triangle,
-    first: [i32; 3],
-    last: [i32; 3],
+pub fn overlap_exact(
+    lanes: &Lanes,
     clip: &Clip,
     rows: &mut Vec<Span>,
     emit: &mut impl FnMut(i32, i32, i32, i32),
 ) {
+    // The first and the last cell along each axis: those whose closed sides the bounds meet.
+    let low = ceil4(lanes[0].fast_min(lanes[1]).fast_min(lanes[2])) - f64x4::ONE;
+    let high = floor4(lanes[0].fast_max(lanes[1]).fast_max(lanes[2]));
+    if (low.simd_gt(clip.high) | high.simd_lt(clip.low)).to_bitmask() != 0 {
+        return;
+    }
+    let whole = |c: f64x4| {
+        let [x, y, z, _] = c.to_array();
+        [x as i32, y as i32, z as i32]
+    };
+    let (q, first, last) = (&corners(lanes), whole(low), whole(high));
     let range: [(i32, i32); 3] =
         std::array::from_fn(|a| (first[a].max(clip.lo[a]), last[a].min(clip.hi[a])));
     let several = (0..3).fold(0, |bits, a| bits | usize::from(first[a] < last[a]) << a);
@@ -299,42 +396,41 @@ fn wide_overlap(
     }
 }
 
-/// Emits the voxels of a mask of octants, in which bits count from the highest of eight voxels down;
-/// `base` is the lowest.
+/// Emits the voxels of a mask of octants.
 #[inline(always)]
-fn pairs(mask: u8, base: [i32; 3], emit: &mut impl FnMut(i32, i32, i32, i32)) {
+pub fn pairs(mask: u8, base: [i32; 3], emit: &mut impl FnMut(i32, i32, i32, i32)) {
     for row in 0..4 {
         let pair = i32::from(mask) >> (2 * row) & 3;
         if pair != 0 {
-            let (first, last) = (i32::from(pair == 1), i32::from(pair != 2));
+            let (first, last) = (i32::from(pair == 2), i32::from(pair != 1));
             emit(
                 base[0] + first,
                 base[0] + last,
-                base[1] + 1 - (row & 1),
-                base[2] + 1 - (row >> 1),
+                base[1] + (row & 1),
+                base[2] + (row >> 1),
             );
         }
     }
 }
 
-/// Emits the voxels of a mask of four along each axis, from `base` on.
+/// Emits the voxels of slices of eight by eight, from `base` on.
 #[inline(always)]
-fn quads(mut mask: u64, base: [i32; 3], emit: &mut impl FnMut(i32, i32, i32, i32)) {
-    // What a convex set touches of a row is one run.
-    while mask != 0 {
-        let row = mask.trailing_zeros() as i32 >> 2;
-        let cells = (mask >> (4 * row) & 0xf) as u32;
-        let (first, last) = (
-            cells.trailing_zeros() as i32,
-            31 - cells.leading_zeros() as i32,
-        );
-        emit(
-            base[0] + first,
-            base[0] + last,
-            base[1] + (row & 3),
-            base[2] + (row >> 2),
-        );
-        mask &= !(0xf << (4 * row));
+pub fn slices(
+    slices: &[u64; octants::EDGE],
+    base: [i32; 3],
+    emit: &mut impl FnMut(i32, i32, i32, i32),
+) {
+    for (z, slice) in (base[2]..).zip(slices) {
+        let mut slice = *slice;
+        // What a convex set touches of a row is one run.
+        while slice != 0 {
+            let row = slice.trailing_zeros() as i32 >> 3;
+            let cells = (slice >> (8 * row) & 0xff) as u32;
+            let first = cells.trailing_zeros() as i32;
+            let last = 31 - cells.leading_zeros() as i32;
+            emit(base[0] + first, base[0] + last, base[1] + row, z);
+            slice &= !(0xff << (8 * row));
+        }
     }
 }
 

@@ -131,6 +131,15 @@ impl Lattice {
         }
     }
 
+    /// A function that brings points to where [`Lattice::in_lanes`] does, but for the rounding of a
+    /// product instead of a quotient: within the grid they are less than 2^-34 voxels apart.
+    #[inline(always)]
+    pub(super) fn near_lanes(&self) -> impl Fn(Vec3) -> f64x4 {
+        let [x, y, z] = self.lo;
+        let (lo, per_h) = (f64x4::new([x, y, z, 0.0]), f64x4::splat(1.0 / self.h));
+        move |[x, y, z]| (f64x4::new([x, y, z, 0.0]) - lo) * per_h
+    }
+
     /// Checks that no coordinate of a mesh with these bounds is too far from the grid to compute with.
     pub fn check_reach(&self, mesh: Aabb) -> Result<()> {
         if mesh.is_empty() {

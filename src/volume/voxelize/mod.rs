@@ -9,6 +9,7 @@
 //! difference from a point that moves with the model, one sum and one division, each rounded to
 //! nearest; all that follows is decided as rational arithmetic would decide it.
 
+mod dense;
 mod fill;
 mod kernel;
 mod lattice;

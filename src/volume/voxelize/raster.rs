@@ -1,4 +1,4 @@
-//! All triangles of a mesh onto a grid: densely with shared words, or sparsely tile by tile.
+//! The surface of a mesh in the coordinates of a grid, and its voxels in a sparse grid, tile by tile.
 
 use super::Mode;
 use super::fill::{Filling, TileState};
@@ -8,14 +8,14 @@ use super::span::Span;
 use crate::error::{Error, Result};
 use crate::mesh::Mesh;
 use crate::progress::Progress;
-use crate::volume::bits::{BitGrid, set_atomic};
 use crate::volume::octree::{Octree, Part, TILE, Tile, tile_key};
 use rayon::prelude::*;
+use std::ops::Range;
 use std::sync::atomic::{AtomicU64, Ordering};
 use wide::f64x4;
 
 /// Primitives per task; fixed, so that results never follow the threads.
-const CHUNK: usize = 4096;
+pub(super) const CHUNK: usize = 4096;
 
 /// The surface of a mesh in the coordinates of a grid: triangles, then segments, then points.
 #[derive(Clone, Copy)]
@@ -38,7 +38,7 @@ pub struct Counts {
 }
 
 impl Counts {
-    fn and(self, other: Counts) -> Counts {
+    pub(super) fn and(self, other: Counts) -> Counts {
         let first = [self.first, other.first].into_iter().flatten().min();
         Counts {
             degenerate: self.degenerate + other.degenerate,
@@ -98,7 +98,7 @@ impl<'a> Surface<'a> {
     }
 
     #[inline(always)]
-    fn lanes(&self, index: usize) -> Lanes {
+    pub(super) fn lanes(&self, index: usize) -> Lanes {
         let to_grid = self.lattice.in_lanes();
         let at = |v: u32| to_grid(self.mesh.positions[v as usize]);
         let triangles = self.mesh.triangles.len();
@@ -111,12 +111,27 @@ impl<'a> Surface<'a> {
         }
     }
 
+    /// The corners of the triangles in a range, within the grid less than 2^-34 voxels from where
+    /// [`Surface::lanes`] has them.
+    #[inline(always)]
+    pub(super) fn near_lanes(&self, triangles: Range<usize>) -> impl Iterator<Item = Lanes> {
+        let to_grid = self.lattice.near_lanes();
+        let positions = &self.mesh.positions;
+        self.mesh.triangles[triangles]
+            .iter()
+            .map(move |t| t.map(|v| to_grid(positions[v as usize])))
+    }
+
     fn is_point(&self, index: usize) -> bool {
         index >= self.mesh.triangles.len() + self.mesh.segments.len()
     }
 
-    /// Emits the runs `(x0, x1, y, z)` of voxels that a primitive sets within `clip`. Returns whether
-    /// it noticed in passing that the primitive has an area.
+    /// The rule by which voxels are set.
+    pub fn mode(&self) -> Mode {
+        self.mode
+    }
+
+    /// Emits the runs `(x0, x1, y, z)` of voxels that a primitive sets within `clip`.
     #[inline(always)]
     pub fn set(
         &self,
@@ -125,13 +140,16 @@ impl<'a> Surface<'a> {
         clip: &Clip,
         rows: &mut Vec<Span>,
         emit: &mut impl FnMut(i32, i32, i32, i32),
-    ) -> bool {
+    ) {
         let axes: &[usize] = match self.mode {
             Mode::Conservative if self.is_point(index) => {
                 self.set_point(&kernel::corners(lanes), clip, emit);
                 &[]
             }
-            Mode::Conservative => return kernel::overlap(lanes, clip, rows, emit),
+            Mode::Conservative => {
+                kernel::overlap(lanes, clip, rows, emit);
+                &[]
+            }
             Mode::ThreeAxis => &[0, 1, 2],
             Mode::Z => &[2],
             Mode::None => &[],
@@ -142,7 +160,6 @@ impl<'a> Surface<'a> {
                 emit(x, x, y, z)
             });
         }
-        false
     }
 
     /// A point sets the voxel that holds it: on a face between two the upper one, on the upper face
@@ -162,7 +179,7 @@ impl<'a> Surface<'a> {
     }
 
     #[inline]
-    fn count(&self, index: usize, lanes: &Lanes) -> Counts {
+    pub(super) fn count(&self, index: usize, lanes: &Lanes) -> Counts {
         let is_triangle = index < self.mesh.triangles.len();
         if is_triangle && kernel::is_degenerate(&kernel::corners(lanes), self.reach) {
             Counts {
@@ -172,50 +189,6 @@ impl<'a> Surface<'a> {
         } else {
             Counts::default()
         }
-    }
-
-    /// Sets the voxels of the surface in a dense grid. Cost: the primitives, the rows they span.
-    pub fn rasterize(&self, grid: &mut BitGrid, progress: &dyn Progress) -> Counts {
-        let clip = Clip::grid(self.lattice.dims);
-        let (stride, ny) = (grid.stride(), grid.dims()[1]);
-        let words = grid.atomic_words();
-        let count = self.len();
-        (0..count.div_ceil(CHUNK))
-            .into_par_iter()
-            .map_init(Scratch::default, |scratch, chunk| {
-                let mut counts = Counts::default();
-                let last = ((chunk + 1) * CHUNK).min(count);
-                // Fetching corners, deciding, and writing wait for memory in different ways; block by
-                // block each goes on while another waits.
-                for block in (chunk * CHUNK..last).step_by(BLOCK) {
-                    let indices = block..(block + BLOCK).min(last);
-                    scratch.corners.clear();
-                    scratch
-                        .corners
-                        .extend(indices.clone().map(|index| self.lanes(index)));
-                    let Scratch {
-                        corners,
-                        rows,
-                        masks,
-                    } = scratch;
-                    masks.clear();
-                    for (index, q) in indices.zip(corners.iter()) {
-                        let has_area = self.set(index, q, &clip, rows, &mut |x0, x1, y, z| {
-                            let row = (z as usize * ny + y as usize) * stride;
-                            push_run(masks, row, x0 as usize, x1 as usize);
-                        });
-                        if !has_area {
-                            counts = counts.and(self.count(index, q));
-                        }
-                    }
-                    for (word, mask) in masks.iter() {
-                        set_atomic(&words[*word], *mask);
-                    }
-                }
-                progress.advance((last - chunk * CHUNK) as u64);
-                counts
-            })
-            .reduce(Counts::default, Counts::and)
     }
 
     /// The octree of the surface and of what `filling` adds, made one tile of 64^3 voxels per thread
@@ -410,31 +383,4 @@ fn tile_rows<'a>(
                 .unwrap_or((row, &[]))
         })
         .collect()
-}
-
-/// Primitives whose corners are fetched, and whose voxels are written, together.
-const BLOCK: usize = 128;
-
-/// Working memory of a thread that fills a dense grid.
-#[derive(Default)]
-struct Scratch {
-    corners: Vec<Lanes>,
-    rows: Vec<Span>,
-    /// Words to set bits in.
-    masks: Vec<(usize, u64)>,
-}
-
-/// Adds the bits `x0..=x1` of the row that starts at a word.
-#[inline(always)]
-fn push_run(masks: &mut Vec<(usize, u64)>, row: usize, x0: usize, x1: usize) {
-    let (first, last) = (x0 / 64, x1 / 64);
-    let low = u64::MAX << (x0 % 64);
-    let high = u64::MAX >> (63 - x1 % 64);
-    if first == last {
-        masks.push((row + first, low & high));
-    } else {
-        masks.push((row + first, low));
-        masks.extend((first + 1..last).map(|word| (row + word, u64::MAX)));
-        masks.push((row + last, high));
-    }
 }

@@ -112,6 +112,17 @@ pub fn floor4(x: f64x4) -> f64x4 {
     rounded - (rounded.simd_gt(x) & f64x4::ONE)
 }
 
+/// The nearest integers of four numbers, as numbers, and the first three of them as indices; the latter
+/// for numbers below 2^31.
+#[inline(always)]
+pub fn nearest_index(x: f64x4) -> (f64x4, [i32; 3]) {
+    let shifted = x + f64x4::splat(ROUNDER);
+    let [i, j, k, _] = shifted.to_array();
+    // There the lowest bits of the number are those of the integer.
+    let index = [i, j, k].map(|c| c.to_bits() as i32);
+    (shifted - f64x4::splat(ROUNDER), index)
+}
+
 #[inline(always)]
 fn nearest4(x: f64x4) -> (f64x4, f64x4) {
     let x = x.fast_max(f64x4::splat(-1e9)).fast_min(f64x4::splat(1e9));
