@@ -128,6 +128,9 @@ pub struct Wrapping {
     /// that an earlier run has touched is warm
     #[arg(long)]
     pub in_process: bool,
+    /// Draw the table here, as an SVG or PNG picture: the extension says which
+    #[arg(long, value_name = "FILE", help_heading = IN_AND_OUT)]
+    pub plot: Option<String>,
     /// Write the table here too, as comma-separated values (RFC 4180)
     #[arg(long, value_name = "FILE", help_heading = IN_AND_OUT)]
     pub csv: Option<String>,

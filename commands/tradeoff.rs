@@ -107,7 +107,10 @@ pub fn run(args: &Args) -> Result<Exit> {
     if !talk.quiet {
         show(&result::shown(&stats).aligned());
     }
-    let output = places.write_csv(&result::exported(&stats))?;
+    let output = places.write(
+        || result::plot(&stats, args.cost, &limits),
+        || result::exported(&stats),
+    )?;
     let exit = judge(&stats, &rows, choice, &limits, talk.quiet);
     places.deliver("tradeoff", asked, stats, input, output)?;
     Ok(exit)

@@ -5,6 +5,7 @@
 mod support;
 
 mod atomic;
+mod chapter;
 mod cli;
 mod determinism;
 mod examples;

@@ -146,7 +146,7 @@ fn a_setting_that_fails_is_a_row_and_all_that_fail_are_an_error() {
 fn a_budget_leaves_rows_that_say_so() {
     let place = Workplace::new();
     let ran = place.run(&format!(
-        "tradeoff voxelize {KNOT} --vary resolution=8,256 --budget 0.001 -q --csv t.csv"
+        "tradeoff voxelize {KNOT} --vary resolution=8,256 --budget 0.001 -q --csv t.csv --plot t.svg"
     ));
     assert_eq!(ran.code, 0, "{}", ran.stderr);
     let report = ran.document();
@@ -159,7 +159,14 @@ fn a_budget_leaves_rows_that_say_so() {
     assert_eq!(lines.len(), 3);
     assert!(lines[0].starts_with("resolution,status,exit_code,error,bound,wall_s,"));
     assert!(lines[1].starts_with("8,done,0,0.") && lines[2].starts_with("256,not-run,0,,,,"));
-    assert_eq!(report["output"][0]["path"], "t.csv");
+    assert_eq!(report["output"][0]["path"], "t.svg");
+    assert_eq!(report["output"][1]["path"], "t.csv");
+    let plot = fs::read_to_string(place.path("t.svg")).expect("the plot");
+    assert!(
+        plot.starts_with("<svg") || plot.starts_with("<?xml"),
+        "{plot}"
+    );
+    assert!(plot.contains("on the front") && plot.contains("error (file unit)"));
 }
 
 #[test]
@@ -238,6 +245,10 @@ fn what_cannot_be_varied_is_refused_with_words() {
             "--report -: is where --csv goes already",
         ),
         (
+            "tradeoff voxelize a.ply --vary mode --plot a.pdf",
+            "--plot a.pdf: its name must end in .svg or .png",
+        ),
+        (
             "stability voxelize a.ply b.ply",
             "stability: 2 inputs, where one is taken",
         ),
@@ -298,7 +309,7 @@ fn drift_beyond_the_limit_ends_with_1_and_names_the_change() {
     // So far away the place of the result itself has no digits left.
     let place = Workplace::new();
     let ran = place.run(&format!(
-        "stability voxelize {KNOT} --resolution 24 --offsets 1e16 --scales 1 --max-error 0 -q --csv s.csv"
+        "stability voxelize {KNOT} --resolution 24 --offsets 1e16 --scales 1 --max-error 0 -q --csv s.csv --plot s.png"
     ));
     assert_eq!(ran.code, 1, "{}", ran.stderr);
     let why = "scantle: stability: check failed: the drift is larger than --max-error 0 under shift 1e16 extents\n";
@@ -307,4 +318,6 @@ fn drift_beyond_the_limit_ends_with_1_and_names_the_change() {
     assert!(report["result"]["unchanged"]["offset"].is_null());
     let table = fs::read_to_string(place.path("s.csv")).expect("the table");
     assert_eq!(table.lines().count(), 1 + rows(&report).len());
+    let plot = fs::read(place.path("s.png")).expect("the plot");
+    assert!(plot.starts_with(b"\x89PNG"));
 }

@@ -3,6 +3,7 @@
 use super::Args;
 use crate::table::{Table, plain, short};
 use crate::wrapped::Wrapped;
+use scantle::image::plot::{Axis, Guide, Line, On, Plot, Point, Scale, Series};
 use scantle::measure::stability::{Drift, Reach, Rounding, Step};
 use scantle::measure::tradeoff::Failed;
 use scantle::mesh::Mesh;
@@ -280,6 +281,60 @@ pub fn exported(stats: &Stats) -> Table {
             .map(|row| row.iter().map(|(_, cell)| cell.clone()).collect())
             .collect(),
     }
+}
+
+/// Drift against scale and offset, both as powers of two.
+pub fn plot(stats: &Stats) -> Plot {
+    let series = |name: &str, index, size: &dyn Fn(Step) -> Option<f64>| {
+        let mut points: Vec<Point> = stats
+            .rows
+            .iter()
+            .filter_map(|row| {
+                Some(Point {
+                    x: size(row.step)?,
+                    y: row.drift?,
+                    label: row
+                        .differing_voxels
+                        .map_or(String::new(), |n| n.to_string()),
+                    ..Point::default()
+                })
+            })
+            .collect();
+        points.sort_by(|a, b| a.x.total_cmp(&b.x));
+        Series {
+            line: Line::Straight,
+            ..Series::new(name, index, points)
+        }
+    };
+    let scale = |step| match step {
+        Step::Scale(exponent) => Some(f64::from(exponent)),
+        _ => None,
+    };
+    let shift = |step| match step {
+        Step::Shift(extents) => Some(extents.log2()),
+        _ => None,
+    };
+    let x = Axis::new("power of two", Scale::Linear);
+    let y = Axis::new("drift (file unit)", Scale::Log);
+    let mut plot = Plot::new(
+        "Drift of the result against scale and offset of the input",
+        x,
+        y,
+    );
+    plot.series = vec![
+        series("scaled by", 0, &scale),
+        series("moved by, in extents", 1, &shift),
+    ];
+    plot.guides = stats
+        .error_bound
+        .map(|value| Guide {
+            on: On::Y,
+            value,
+            text: format!("the command's own error bound, {}", short(value)),
+        })
+        .into_iter()
+        .collect();
+    plot
 }
 
 /// How far results hold, for people.

@@ -4,7 +4,8 @@ use super::vary::Knobs;
 use crate::table::{Table, bytes, plain, short};
 use crate::words;
 use crate::wrapped::Wrapped;
-use scantle::measure::tradeoff::{Choice, Limits, Params, Row, Spread, Status};
+use scantle::image::plot::{Axis, Guide, Marker, On, Plot, Point, Scale, Series};
+use scantle::measure::tradeoff::{Choice, Cost, Limits, Params, Row, Spread, Status};
 use scantle::report::Modelled;
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -273,6 +274,60 @@ pub fn exported(stats: &Stats) -> Table {
         rows: rows.collect(),
         headings,
     }
+}
+
+/// Error against cost: the front, and what is not on it.
+pub fn plot(stats: &Stats, cost: Cost, limits: &Limits) -> Plot {
+    let (title, limit) = match cost {
+        Cost::Wall => ("wall time (s)", limits.max_seconds),
+        Cost::Cpu => ("processor time (s)", None),
+        Cost::Memory => ("peak memory (bytes)", limits.max_memory.map(|m| m as f64)),
+    };
+    let point = |row: &Setting| {
+        let spread = match cost {
+            Cost::Wall => row.wall_s,
+            Cost::Cpu => row.cpu_s,
+            Cost::Memory => None,
+        };
+        let x = match cost {
+            Cost::Memory => row.peak_bytes.map(|bytes| bytes as f64),
+            _ => spread.map(|s| s.median),
+        };
+        let values: Vec<String> = row.setting.values().map(plain).collect();
+        Some(Point {
+            x: x?,
+            y: row.error?,
+            x_spread: spread.map(|s| [s.min, s.max]),
+            y_spread: None,
+            label: values.join(" "),
+        })
+    };
+    let front = stats.front.iter().filter_map(|i| point(&stats.rows[*i]));
+    let others = stats.rows.iter().filter(|row| !row.on_front);
+    let Error { measure, unit, .. } = stats.error;
+    let y = Axis::new(format!("error ({unit})"), Scale::Log);
+    let mut plot = Plot::new(measure, Axis::new(title, Scale::Log), y);
+    plot.series = vec![
+        Series::front("on the front", front.collect()),
+        Series {
+            marker: Marker::Ring,
+            ..Series::new("beaten by another", 0, others.filter_map(point).collect())
+        },
+    ];
+    let guide = |on, value: Option<f64>| {
+        value.map(|value| Guide {
+            on,
+            value,
+            text: format!("at most {}", short(value)),
+        })
+    };
+    let guides = [guide(On::Y, limits.max_error), guide(On::X, limit)];
+    plot.guides = guides.into_iter().flatten().collect();
+    plot.caption = stats.choice.as_ref().map_or(String::new(), |choice| {
+        let values: Vec<String> = choice.setting.values().map(plain).collect();
+        format!("{}: {}", choice.best, values.join(" "))
+    });
+    plot
 }
 
 /// The limits, for people: `an error of at most 0.1, at most 2 s`.

@@ -135,9 +135,10 @@ impl Lattice {
     /// product instead of a quotient: within the grid they are less than 2^-34 voxels apart.
     #[inline(always)]
     pub(super) fn near_lanes(&self) -> impl Fn(Vec3) -> f64x4 {
-        let [x, y, z] = self.lo;
-        let (lo, per_h) = (f64x4::new([x, y, z, 0.0]), f64x4::splat(1.0 / self.h));
-        move |[x, y, z]| (f64x4::new([x, y, z, 0.0]) - lo) * per_h
+        let lanes = |[x, y, z]: Vec3| f64x4::new([x, y, z, 0.0]);
+        let (anchor, margin) = (lanes(self.anchor), lanes(self.margin));
+        let per_h = f64x4::splat(1.0 / self.h);
+        move |p| (lanes(p) - anchor + margin) * per_h
     }
 
     /// Checks that no coordinate of a mesh with these bounds is too far from the grid to compute with.
