@@ -119,6 +119,9 @@ impl Spread {
     }
 }
 
+/// Runs a setting, and verifies its error where the second argument says so.
+pub type Runner<'a> = dyn FnMut(&[usize], bool) -> Result<Ran, Failed> + 'a;
+
 /// What became of a setting.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
@@ -181,12 +184,12 @@ impl Row {
 /// are taken up one at a time, those predicted to be cheapest first, for as long as the time is
 /// predicted to suffice for all their runs; the first is run in any case. A setting that fails is
 /// a row like any other. Nothing here costs anything beside the runs.
-pub fn run(
-    grid: &Grid,
+pub fn run<'a>(
+    grid: &'a Grid,
     params: &Params,
-    runner: &mut dyn FnMut(&[usize], bool) -> Result<Ran, Failed>,
-    clock: &dyn Fn() -> f64,
-    progress: &dyn Progress,
+    runner: &'a mut Runner<'a>,
+    clock: &'a dyn Fn() -> f64,
+    progress: &'a dyn Progress,
 ) -> Vec<Row> {
     let mut plan = Plan {
         grid,
@@ -248,7 +251,7 @@ struct Plan<'a> {
     grid: &'a Grid,
     settings: Vec<Vec<usize>>,
     tried: Vec<Tried>,
-    runner: &'a mut dyn FnMut(&[usize], bool) -> Result<Ran, Failed>,
+    runner: &'a mut Runner<'a>,
     clock: &'a dyn Fn() -> f64,
     began: f64,
     budget: Option<f64>,
