@@ -133,17 +133,7 @@ impl Border {
         if self.edges.is_empty() {
             return Vec::new();
         }
-        let lo = [0, at[0] * TILE, at[1] * TILE];
-        let hi = [
-            dims[0],
-            dims[1].min(lo[1] + TILE),
-            dims[2].min(lo[2] + TILE),
-        ];
-        let block = Block {
-            lo: lo.map(|c| c as u32),
-            hi: hi.map(|c| c as u32),
-        };
-        let mut steps = Descent::through(&self.edges, block).steps;
+        let mut steps = Descent::through(&self.edges, tile_row(at, dims)).steps;
         steps.sort_unstable_by_key(|s| (s.row, s.x));
         // Only changes matter, and a row starts at 0.
         let mut kept: Vec<Step> = Vec::new();
@@ -157,6 +147,26 @@ impl Border {
             }
         }
         kept
+    }
+
+    /// How many times [`Border::steps`] looks at an edge.
+    #[cfg(test)]
+    pub fn work(&self, at: [usize; 2], dims: [usize; 3]) -> u64 {
+        Descent::through(&self.edges, tile_row(at, dims)).work
+    }
+}
+
+/// The voxels of a row of tiles.
+fn tile_row(at: [usize; 2], dims: [usize; 3]) -> Block {
+    let lo = [0, at[0] * TILE, at[1] * TILE];
+    let hi = [
+        dims[0],
+        dims[1].min(lo[1] + TILE),
+        dims[2].min(lo[2] + TILE),
+    ];
+    Block {
+        lo: lo.map(|c| c as u32),
+        hi: hi.map(|c| c as u32),
     }
 }
 

@@ -7,12 +7,18 @@ use crate::mesh::distance::point_segment;
 use crate::numeric::vector::{Vec3, length, sub};
 use crate::volume::octree::TILE;
 
-/// How much of a winding number all edges may be off that are known by their summed field only.
-const FAR: f64 = 2e-3;
+/// How much of a winding number all edges may be off that are known by their summed field only, in a
+/// voxel. In a larger box it is less, so that a voxel which does not settle can ask larger boxes.
+const FAR: f64 = 0.3;
 /// The part of what is left of it that one box may use.
-const SHARE: f64 = 0.25;
+const SHARE: f64 = 0.5;
 /// Rounding of one edge's solid angle, generously.
 const ROUNDING: f64 = 1e-12;
+/// The share of that for voxels that do not settle with it.
+const FINE: f64 = 0.1;
+/// What it costs to follow an edge, one that may be met, and to split a box for each edge near it,
+/// over the cost of following the summed field.
+const COSTS: [usize; 3] = [6, 20, 150];
 /// Edges nearer to a box than this share of its size, or of their own distance, are followed as if
 /// they met it.
 const TOUCHING: (f64, f64) = (1e-3, 1e-12);
@@ -100,6 +106,12 @@ impl Hull {
         (distance > TOUCHING.0 * self.radius + TOUCHING.1 * reach).then_some(distance)
     }
 
+    /// How much of a winding number the edges may be off that are known by their field.
+    fn far(&self) -> f64 {
+        let size = 1.0 + self.radius;
+        FAR / (size * size.sqrt())
+    }
+
     /// Whether the strip of an edge may be between the hull's points.
     fn may_be_crossed(&self, edge: &Edge) -> bool {
         let (Edge { a, b, .. }, c, e) = (edge, self.at, self.extent);
@@ -116,7 +128,9 @@ impl Hull {
 }
 
 /// What is known at the middle of a box.
-struct Node {
+struct Node<'p> {
+    /// What was known of the box that this one is a part of.
+    whole: Option<&'p Node<'p>>,
     at: Vec3,
     /// What all strips together take there.
     value: f64,
@@ -148,7 +162,8 @@ pub struct Descent<'a> {
     /// What was found, in no order.
     pub steps: Vec<Step>,
     /// How many times an edge was looked at.
-    pub evaluations: u64,
+    #[cfg(test)]
+    pub work: u64,
 }
 
 impl<'a> Descent<'a> {
@@ -158,12 +173,14 @@ impl<'a> Descent<'a> {
             edges,
             origin: [block.lo[1], block.lo[2]],
             steps: Vec::new(),
-            evaluations: 0,
+            #[cfg(test)]
+            work: 0,
         };
         let at = Hull::of(&block).at;
         let all: Vec<u32> = (0..edges.len() as u32).collect();
         let (value, slack) = descent.afresh(at);
         let root = Node {
+            whole: None,
             at,
             value,
             slack,
@@ -180,9 +197,17 @@ impl<'a> Descent<'a> {
         &self.edges[*index as usize]
     }
 
+    /// Notes that this many edges were looked at.
+    fn note(&mut self, _edges: usize) {
+        #[cfg(test)]
+        {
+            self.work += _edges as u64;
+        }
+    }
+
     /// What all strips together take at a point, and its error.
     fn afresh(&mut self, p: Vec3) -> (f64, f64) {
-        self.evaluations += self.edges.len() as u64;
+        self.note(self.edges.len());
         let taken: f64 = self.edges.iter().map(|e| e.taken(p)).sum();
         let times: f64 = self.edges.iter().map(|e| e.times.abs()).sum();
         (taken, TIE + times * ROUNDING)
@@ -191,29 +216,39 @@ impl<'a> Descent<'a> {
     /// Settles a box, or its parts.
     fn visit(&mut self, block: &Block, from: &Node) {
         let hull = Hull::of(block);
-        let mut node = self.moved(from, hull.at);
         if block.size() == [1; 3] {
-            let taken = match whole(node.value, node.slack) {
-                Some(whole) => 2 * whole,
-                // What was left out on the way decides here, so nothing is.
-                None => doubled(self.afresh(hull.at).0),
-            };
+            let taken = self.voxel(hull.at, from);
             self.push([block.lo[1], block.lo[2]], block.lo[0], taken);
             return;
         }
+        let mut node = self.moved(from, hull.at);
         let near = self.gather(&mut node, from, &hull);
-        match self.settle(&node, &near, &hull) {
-            Some(whole) => self.push_rows(block, &node, &hull, whole),
-            None => {
-                for part in block.parts() {
-                    self.visit(&part, &node);
-                }
+        if !self.settle(block, &node, &near, &hull) {
+            for part in block.parts() {
+                self.visit(&part, &node);
             }
         }
     }
 
+    /// What is taken at a voxel's centre; see [`Step::doubled`].
+    fn voxel(&mut self, at: Vec3, from: &Node) -> i64 {
+        let mut from = Some(from);
+        // What was left to the field may decide here; then larger boxes know better, at more cost.
+        while let Some(node) = from {
+            if 2 * (node.touching.len() + node.near.len()) > self.edges.len() {
+                break;
+            }
+            let followed = self.followed(node, at);
+            if let Some(whole) = followed.and_then(|(value, slack)| whole(value, slack)) {
+                return 2 * whole;
+            }
+            from = node.whole;
+        }
+        doubled(self.afresh(at).0)
+    }
+
     /// What is known at a point, from what is known at another of the same box.
-    fn moved(&mut self, from: &Node, to: Vec3) -> Node {
+    fn moved<'p>(&mut self, from: &'p Node<'p>, to: Vec3) -> Node<'p> {
         let way = sub(to, from.at);
         let field = from.field.moved(way);
         let (value, slack) = match way == [0.0; 3] {
@@ -221,6 +256,7 @@ impl<'a> Descent<'a> {
             false => self.followed(from, to).unwrap_or_else(|| self.afresh(to)),
         };
         Node {
+            whole: Some(from),
             at: to,
             value,
             slack,
@@ -234,7 +270,7 @@ impl<'a> Descent<'a> {
     /// What the strips take at a point and its error; `None` where rounding may decide on which side
     /// of an edge the way there runs.
     fn followed(&mut self, from: &Node, to: Vec3) -> Option<(f64, f64)> {
-        self.evaluations += (from.touching.len() + from.near.len()) as u64;
+        self.note(from.touching.len() + from.near.len());
         let way = sub(to, from.at);
         let mut value = from.value + from.field.swept(way);
         let mut slack = from.slack + from.field.error(length(way));
@@ -257,7 +293,7 @@ impl<'a> Descent<'a> {
     /// Sorts the edges of a box: what meets it, what is so far that its field does for all that is
     /// in the box, and the others, which are returned.
     fn gather(&mut self, node: &mut Node, from: &Node, hull: &Hull) -> Vec<Apart> {
-        self.evaluations += (from.touching.len() + from.near.len()) as u64;
+        self.note(from.touching.len() + from.near.len());
         let mut apart = Vec::with_capacity(from.near.len());
         for index in from.touching.iter().chain(&from.near) {
             let edge = self.edge(index);
@@ -278,7 +314,7 @@ impl<'a> Descent<'a> {
                 .total_cmp(&b.error)
                 .then_with(|| a.index.cmp(&b.index))
         });
-        let mut budget = SHARE * (FAR - node.slack - node.field.error(hull.radius));
+        let mut budget = SHARE * (hull.far() - node.slack - node.field.error(hull.radius));
         let mut far = 0;
         for edge in &apart {
             budget -= edge.error;
@@ -296,25 +332,85 @@ impl<'a> Descent<'a> {
         near
     }
 
-    /// What the strips take in the whole box, rounded, as seen from its middle without their jumps.
-    fn settle(&self, node: &Node, near: &[Apart], hull: &Hull) -> Option<i64> {
-        if !node.touching.is_empty() {
-            return None;
+    /// Notes what the strips take in a box, unless that has to be seen from nearer.
+    fn settle(&mut self, block: &Block, node: &Node, near: &[Apart], hull: &Hull) -> bool {
+        if node.touching.is_empty()
+            && let Some(whole) = self.uniform(node, near, hull)
+        {
+            self.push_rows(block, node, hull, whole);
+            return true;
         }
-        let mut open = node.slack + node.field.error(hull.radius);
-        open += near
-            .iter()
-            .map(|e| e.error.min(e.bounds.field * hull.radius))
-            .sum::<f64>();
+        self.scan(block, node, near, hull)
+    }
+
+    /// What the strips take in a whole box, rounded, as seen from its middle without their jumps.
+    fn uniform(&self, node: &Node, near: &[Apart], hull: &Hull) -> Option<i64> {
+        let change = |e: &Apart| e.bounds.field * hull.radius;
+        let bounds: f64 = near.iter().map(|e| e.error.min(change(e))).sum();
+        let open = node.slack + node.field.error(hull.radius) + bounds;
         // The fields can only add to what is open.
         whole(node.value, open)?;
         let mut field = node.field;
-        for edge in near {
-            if edge.error < edge.bounds.field * hull.radius {
-                field.add_exact(self.edge(&edge.index), hull.at);
-            }
+        for edge in near.iter().filter(|e| e.error < change(e)) {
+            field.add_exact(self.edge(&edge.index), hull.at);
         }
         whole(node.value, open + field.range(hull.extent))
+    }
+
+    /// Settles the voxels of a box one by one, where that is less work than to split it: only the
+    /// nearest edges are followed to each, and the others by their summed field.
+    fn scan(&mut self, block: &Block, node: &Node, near: &[Apart], hull: &Hull) -> bool {
+        let size = block.size().map(|s| s as usize);
+        let [follow, touch, split] = COSTS;
+        let by_field = within(near, hull.far());
+        let each = 1 + follow * (near.len() - by_field) + touch * node.touching.len();
+        let edges = near.len() + node.touching.len();
+        if size[0] * size[1] * size[2] * each > split * edges {
+            return false;
+        }
+        // Voxels near to a half follow more edges, before they follow all of this box.
+        let fine = self.coarser(node, near, hull, within(near, FINE * hull.far()));
+        let coarse = Node {
+            whole: Some(&fine),
+            ..self.coarser(node, near, hull, by_field)
+        };
+        for z in block.lo[2]..block.hi[2] {
+            for y in block.lo[1]..block.hi[1] {
+                let mut last = None;
+                for x in block.lo[0]..block.hi[0] {
+                    let at = [x, y, z].map(|c| f64::from(c) + 0.5);
+                    let taken = self.voxel(at, &coarse);
+                    if last != Some(taken) {
+                        self.push([y, z], x, taken);
+                        last = Some(taken);
+                    }
+                }
+            }
+        }
+        true
+    }
+
+    /// The same knowledge of a box with the first `by_field` of its near edges left to the field.
+    fn coarser<'p>(
+        &mut self,
+        node: &'p Node<'p>,
+        near: &[Apart],
+        hull: &Hull,
+        by_field: usize,
+    ) -> Node<'p> {
+        let mut field = node.field;
+        for edge in &near[..by_field] {
+            field.add(self.edge(&edge.index), hull.at, &edge.bounds);
+        }
+        self.note(by_field);
+        Node {
+            whole: Some(node),
+            field,
+            touching: node.touching.clone(),
+            near: node.near[by_field..].to_vec(),
+            strips: node.strips.clone(),
+            ..*node
+        }
     }
 
     fn push(&mut self, [y, z]: [u32; 2], x: u32, doubled: i64) {
@@ -322,10 +418,21 @@ impl<'a> Descent<'a> {
         self.steps.push(Step { row, x, doubled });
     }
 
-    /// Notes what is taken in the rows of a settled box, which no edge meets.
+    /// Notes what is taken in the rows of a box, if the smooth part of it is `whole` in all.
+    fn push_rows(&mut self, block: &Block, node: &Node, hull: &Hull, whole: i64) {
+        let rows_y = block.size()[1] as usize;
+        let jumps = self.jumps(block, node, hull);
+        for (z, row) in (block.lo[2]..).zip(jumps.chunks(rows_y)) {
+            for (y, jump) in (block.lo[1]..).zip(row) {
+                self.push([y, z], block.lo[0], 2 * (whole + jump));
+            }
+        }
+    }
+
+    /// By how much the strips jump from the middle of a box, which no edge meets, to its rows.
     ///
     /// The way from the middle of the box to a row runs along y first and then along z.
-    fn push_rows(&mut self, block: &Block, node: &Node, hull: &Hull, whole: i64) {
+    fn jumps(&self, block: &Block, node: &Node, hull: &Hull) -> Vec<i64> {
         let [_, rows_y, rows_z] = block.size().map(|s| s as usize);
         let mut jumps = vec![0i64; rows_y * rows_z];
         let centre = |c: u32| f64::from(c) + 0.5;
@@ -352,12 +459,19 @@ impl<'a> Descent<'a> {
                 }
             }
         }
-        for (z, row) in (block.lo[2]..).zip(jumps.chunks(rows_y)) {
-            for (y, jump) in (block.lo[1]..).zip(row) {
-                self.push([y, z], block.lo[0], 2 * (whole + jump));
-            }
-        }
+        jumps
     }
+}
+
+/// How many of the edges may be left to the field, the farthest first, with this error together.
+fn within(near: &[Apart], error: f64) -> usize {
+    let mut sum = 0.0;
+    near.iter()
+        .take_while(|e| {
+            sum += e.error;
+            sum <= error
+        })
+        .count()
 }
 
 /// A value rounded, half a number up, where it can be off by `open` without changing that.

@@ -95,7 +95,7 @@ impl Edge {
     pub fn swept(&self, from: Vec3, to: Vec3) -> f64 {
         let [(v1, c1), (v2, c2)] = self.half_angles(from, to);
         // A flat quadrilateral has a solid angle below 2 pi: one arc tangent does for both halves.
-        self.times * (v1 * c2 + v2 * c1).atan2(c1 * c2 - v1 * v2) / (2.0 * PI)
+        self.times * angle(v1 * c2 + v2 * c1, c1 * c2 - v1 * v2) / (2.0 * PI)
     }
 
     /// The same for any edge, or `None` where the way passes it so near that rounding decides.
@@ -135,7 +135,7 @@ impl Edge {
     fn half_angles(&self, from: Vec3, to: Vec3) -> [(f64, f64); 2] {
         let [a, b] = [sub(self.a, from), sub(self.b, from)];
         let [a1, b1] = [sub(self.a, to), sub(self.b, to)];
-        let [la, lb, la1, lb1] = [a, b, a1, b1].map(length);
+        let (la, lb, la1, lb1) = (length(a), length(b), length(a1), length(b1));
         let [a, b, a1, b1] = [
             scale(a, 1.0 / la),
             scale(b, 1.0 / lb),
@@ -150,6 +150,21 @@ impl Edge {
             (along / (la1 * lb1), diagonal + dot(b1, a1) + dot(a1, a)),
         ]
     }
+}
+
+/// The angle of a vector; small ones by the series of the arc tangent, of which nothing that counts
+/// is left out.
+#[inline]
+fn angle(y: f64, x: f64) -> f64 {
+    let small = x > 0.0 && y.abs() <= 0.05 * x;
+    if !small {
+        return y.atan2(x);
+    }
+    let t = y / x;
+    let s = t * t;
+    let sum = 1.0 / 9.0 - s * (1.0 / 11.0);
+    let sum = 1.0 / 5.0 - s * (1.0 / 7.0 - s * sum);
+    t * (1.0 - s * (1.0 / 3.0 - s * sum))
 }
 
 /// The side of the line `p q` on which `c` lies when the line is moved by (e, e^2); 0 only where `p`
