@@ -22,7 +22,7 @@ pub struct Field {
     error: [f64; 3],
 }
 
-/// The distance to an edge's ends together, and bounds from a distance below which it never comes.
+/// Bounds on an edge's field from points that never come nearer to it than some distance.
 #[derive(Debug, Clone, Copy)]
 pub struct Bounds {
     /// The field itself.
