@@ -23,6 +23,7 @@ use self::edge::Edge;
 use super::lattice::Lattice;
 use crate::mesh::Mesh;
 use crate::mesh::identify::identify;
+use crate::numeric::vector::Vec3;
 use crate::numeric::vector::{cross, length, sub};
 use crate::volume::octree::TILE;
 use rayon::prelude::*;
