@@ -116,7 +116,7 @@ pub fn compare(a: &Image, b: &Image, progress: &dyn Progress) -> Result<ImageDif
     }
     let pixels = a.pixels();
     let grey = a.channels < 3 && b.channels < 3;
-    let opacity = a.channels % 2 == 0 || b.channels % 2 == 0;
+    let opacity = a.channels.is_multiple_of(2) || b.channels.is_multiple_of(2);
     let channels = if grey { 1 } else { 3 } + usize::from(opacity);
     // Grey differs three times as red, green and blue.
     let squares = if grey { all.colour / 3.0 } else { all.colour } + all.opacity;

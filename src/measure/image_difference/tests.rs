@@ -22,7 +22,7 @@ fn pattern(x: usize, y: usize) -> [u8; 4] {
 
 fn disturbed(x: usize, y: usize) -> [u8; 4] {
     let mut pixel = pattern(x, y);
-    if (x + 2 * y) % 5 == 0 {
+    if (x + 2 * y).is_multiple_of(5) {
         pixel[0] ^= 12;
     }
     if (x * y) % 7 == 3 {
