@@ -11,7 +11,7 @@ const MAY_USE: &[(&str, &[&str])] = &[
     ("report", &[]),
     ("numeric", &["error"]),
     ("spatial", &["error", "numeric", "progress"]),
-    ("image", &["error", "numeric"]),
+    ("image", &["error", "numeric", "report"]),
     (
         "mesh",
         &["error", "numeric", "progress", "report", "spatial"],

@@ -15,6 +15,9 @@
 /// Height of a capital, in the units of the paths.
 pub(super) const CAP: f64 = 14.0;
 
+/// A capital as a share of the em, by which other programs give the size of a font: as in Helvetica.
+pub(super) const CAP_OF_EM: f64 = 0.72;
+
 /// White between the ink of one letter and the next.
 pub(super) const GAP: f64 = 3.1;
 

@@ -32,63 +32,98 @@ pub fn shortened(text: &str, cap: f64, room: f64) -> String {
     if width(text, cap) <= room {
         return text.to_owned();
     }
-    let mut kept: Vec<char> = text.chars().collect();
-    while kept.pop().is_some() {
-        let candidate = kept.iter().chain(&['…']).collect::<String>();
-        if width(&candidate, cap) <= room {
-            return candidate;
+    let mut units = glyph('…').0;
+    let mut end = None;
+    for (at, c) in text.char_indices() {
+        if units * cap / CAP > room {
+            break;
         }
+        end = Some(at);
+        units += glyph(c).0 + GAP;
     }
-    String::new()
+    end.map_or(String::new(), |end| format!("{}…", &text[..end]))
 }
 
 /// Writes a text with its baseline at height `at[1]`, hung at `at[0]`, in pixels from the top left.
 ///
 /// Letters are smooth: a pixel takes as much ink as the stroke covers of a disc in it.
 pub fn draw(picture: &mut Picture, text: &str, at: [f64; 2], cap: f64, align: Align, colour: Srgb) {
-    let unit = cap / CAP;
-    let mut x = match align {
+    let left = match align {
         Align::Left => at[0],
         Align::Centre => at[0] - width(text, cap) * 0.5,
         Align::Right => at[0] - width(text, cap),
     };
-    for c in text.chars() {
+    for mut strokes in letters(text, cap) {
+        for s in &mut strokes {
+            *s = s.map(|[x, y]| [left + x, at[1] + y]);
+        }
+        draw_strokes(picture, &strokes, stroke(cap), colour);
+    }
+}
+
+/// The width of a letter's strokes in pixels, for capitals `cap` pixels high.
+pub(super) fn stroke(cap: f64) -> f64 {
+    (cap * STROKE).max(1.0)
+}
+
+/// The strokes of each letter, in pixels from where the text begins on its baseline, y downwards.
+pub(super) fn letters(text: &str, cap: f64) -> impl Iterator<Item = Vec<[[f64; 2]; 2]>> {
+    let unit = cap / CAP;
+    text.chars().scan(0.0, move |begin, c| {
         let (ink, path) = glyph(c);
         let mut strokes = segments(path);
         for s in &mut strokes {
-            *s = s.map(|[px, py]| [x + px * unit, at[1] - py * unit]);
+            *s = s.map(|[px, py]| [*begin + px * unit, -py * unit]);
         }
-        draw_strokes(picture, &strokes, (cap * STROKE).max(1.0), colour);
-        x += (ink + GAP) * unit;
-    }
+        *begin += (ink + GAP) * unit;
+        Some(strokes)
+    })
 }
 
 /// Draws round-ended strokes, all as one shape: where they cross, ink is not laid twice.
-fn draw_strokes(picture: &mut Picture, strokes: &[[[f64; 2]; 2]], width: f64, colour: Srgb) {
+///
+/// Cost: linear in the pixels of the boxes around each stroke.
+pub(super) fn draw_strokes(
+    picture: &mut Picture,
+    strokes: &[[[f64; 2]; 2]],
+    width: f64,
+    colour: Srgb,
+) {
     let reach = width * 0.5 + 1.0;
-    let points = || strokes.iter().flatten();
-    let low = |a: usize| points().map(|p| p[a]).fold(f64::INFINITY, f64::min) - reach;
-    let high = |a: usize| points().map(|p| p[a]).fold(f64::NEG_INFINITY, f64::max) + reach;
-    if strokes.is_empty() {
-        return;
-    }
-    let (size_x, size_y) = (picture.width() as f64, picture.height() as f64);
-    let range = |lo: f64, hi: f64, size: f64| {
-        lo.floor().clamp(0.0, size) as isize..hi.ceil().clamp(0.0, size) as isize
+    let size = [picture.width() as f64, picture.height() as f64];
+    // The first and the last pixel of a stroke along an axis, cut to the picture.
+    let span = |[a, b]: [[f64; 2]; 2], axis: usize| {
+        let low = (a[axis].min(b[axis]) - reach).floor();
+        let high = (a[axis].max(b[axis]) + reach).ceil();
+        low.clamp(0.0, size[axis]) as usize..high.clamp(0.0, size[axis]) as usize
     };
-    for y in range(low(1), high(1), size_y) {
-        for x in range(low(0), high(0), size_x) {
-            let p = [x as f64 + 0.5, y as f64 + 0.5];
-            let nearest = strokes
-                .iter()
-                .map(|s| distance(p, *s))
-                .fold(f64::INFINITY, f64::min);
-            picture.blend(x, y, colour, width * 0.5 - nearest + 0.5);
+    let whole = |axis: usize| {
+        let spans = || strokes.iter().map(|s| span(*s, axis));
+        let low = spans().map(|s| s.start).min().unwrap_or(0);
+        low..spans().map(|s| s.end).max().unwrap_or(0)
+    };
+    let (columns, rows) = (whole(0), whole(1));
+    let mut cover = vec![0.0_f64; columns.len() * rows.len()];
+    for s in strokes {
+        for y in span(*s, 1) {
+            for x in span(*s, 0) {
+                let p = [x as f64 + 0.5, y as f64 + 0.5];
+                let at = &mut cover[(y - rows.start) * columns.len() + x - columns.start];
+                *at = at.max(width * 0.5 - distance(p, *s) + 0.5);
+            }
+        }
+    }
+    for (row, y) in cover.chunks(columns.len().max(1)).zip(rows) {
+        for (part, x) in row.iter().zip(columns.clone()) {
+            if *part > 0.0 {
+                picture.blend(x as isize, y as isize, colour, *part);
+            }
         }
     }
 }
 
-fn distance(p: [f64; 2], [a, b]: [[f64; 2]; 2]) -> f64 {
+/// The distance of a point from a stroke's centre line.
+pub(super) fn distance(p: [f64; 2], [a, b]: [[f64; 2]; 2]) -> f64 {
     let (along, to) = ([b[0] - a[0], b[1] - a[1]], [p[0] - a[0], p[1] - a[1]]);
     let square = along[0] * along[0] + along[1] * along[1];
     let t = if square > 0.0 {
