@@ -5,7 +5,9 @@ use crate::exit::Exit;
 use crate::job::{Found, Job};
 use crate::shared::{Common, InputFormat, Seed, not_negative};
 use scantle::error::Result;
+use scantle::image::samples::Image;
 use scantle::io::Content;
+use scantle::measure::image_difference::{self, ImageDifference};
 use scantle::measure::mesh_distance::{self, MeshDifference};
 use scantle::measure::volume_difference::{self, VolumeDifference};
 use scantle::mesh::Mesh;
@@ -14,10 +16,11 @@ use scantle::volume::Volume;
 use schemars::JsonSchema;
 use serde::Serialize;
 
-/// Measure how far two meshes, or two volumes, are from each other
+/// Measure how far two meshes, volumes or images are from each other
 ///
 /// Meshes: the Hausdorff distance with a proven bound, mean and root mean square distances, area
-/// and volume. Volumes of the same dimensions: the voxels that differ, and by how much.
+/// and volume. Volumes of the same dimensions: the voxels that differ, and by how much. Images of
+/// the same size: the pixels that differ, the largest difference of a channel, PSNR and SSIM.
 #[derive(Debug, clap::Args)]
 #[command(after_long_help = EXAMPLES)]
 pub struct Args {
@@ -27,7 +30,8 @@ pub struct Args {
     #[command(flatten)]
     format: InputFormat,
     /// Exit with 1 when they differ by more than X: for meshes the Hausdorff distance in the file's
-    /// unit, for volumes the number of voxels that differ
+    /// unit, for volumes the number of voxels that differ, for images the largest difference of a
+    /// channel in steps of eight bits (255 is full)
     #[arg(long, value_name = "X", value_parser = not_negative)]
     tolerance: Option<f64>,
     /// Points spread over each mesh for mean and root mean square
@@ -66,6 +70,8 @@ pub enum Stats {
     Mesh(Box<MeshDifference>),
     /// Two volumes.
     Volume(Box<VolumeDifference>),
+    /// Two images.
+    Image(Box<ImageDifference>),
 }
 
 /// The report of this command.
@@ -85,6 +91,7 @@ pub fn run(args: &Args) -> Result<Exit> {
         let found = match job.read()? {
             Content::Mesh(a) => meshes(job, &a, params, args.tolerance),
             Content::Volume(a) => volumes(job, &a, args.tolerance),
+            Content::Image(a) => images(job, &a, args.tolerance),
         };
         Ok(found?.check("tolerance", args.tolerance))
     })
@@ -125,4 +132,19 @@ fn volumes(job: &mut Job, a: &Volume, tolerance: Option<f64>) -> Result<Found<Pa
     let summary = format!("{differing} of {voxels} voxels differ");
     let accuracy = Measures::One(difference.accuracy());
     Ok(Found::new(params, Stats::Volume(Box::new(difference)), summary).accuracy(accuracy))
+}
+
+fn images(job: &mut Job, a: &Image, tolerance: Option<f64>) -> Result<Found<Params, Stats>> {
+    let b = job.read_image()?;
+    job.expect_room("comparing two images", image_difference::room(a))?;
+    let difference = image_difference::compare(a, &b, job.progress())?;
+    let params = Params {
+        tolerance,
+        mesh: None,
+        volume: None,
+    };
+    let (differing, pixels, max) = (difference.differing, difference.pixels, difference.max);
+    let summary = format!("{differing} of {pixels} pixels differ, by at most {max} of 255");
+    let accuracy = Measures::One(difference.accuracy());
+    Ok(Found::new(params, Stats::Image(Box::new(difference)), summary).accuracy(accuracy))
 }

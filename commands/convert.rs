@@ -7,7 +7,7 @@ use crate::shared::{Common, Inputs, Output};
 use crate::words;
 use scantle::error::Result;
 use scantle::io;
-use scantle::io::format::{Format, Kind};
+use scantle::io::format::Format;
 use schemars::JsonSchema;
 use serde::Serialize;
 
@@ -42,7 +42,7 @@ pub struct Params {
 /// What was done.
 #[derive(Debug, Serialize, JsonSchema)]
 pub struct Stats {
-    /// What was converted: `mesh` or `volume`.
+    /// What was converted: `mesh`, `volume` or `image`.
     kind: &'static str,
 }
 
@@ -58,14 +58,16 @@ pub fn run(args: &Args) -> Result<Exit> {
 
 fn convert(job: &mut Job) -> Result<Found<Params, Stats>> {
     let content = job.read()?;
-    let kind = match &content {
-        io::Content::Mesh(_) => Kind::Mesh,
-        io::Content::Volume(_) => Kind::Volume,
-    };
+    let kind = content.kind();
     job.expect_output(&[kind])?;
     match &content {
         io::Content::Mesh(mesh) => job.write_mesh(mesh)?,
         io::Content::Volume(volume) => job.write_volume(volume)?,
+        io::Content::Image(_) => {
+            if let Some(format) = job.output_format() {
+                return Err(io::cannot_hold(format, kind));
+            }
+        }
     }
     let params = Params {
         output_format: job.output_format().map(Format::name),

@@ -42,6 +42,8 @@ pub enum Stats {
     Mesh(Box<Topology>),
     /// Voxels.
     Volume(VolumeStats),
+    /// Pixels.
+    Image(ImageStats),
 }
 
 /// What is in a volume.
@@ -61,6 +63,19 @@ pub struct VolumeStats {
     min: Option<f64>,
     /// Largest value, null in a volume without voxels.
     max: Option<f64>,
+}
+
+/// What is in an image.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct ImageStats {
+    /// Pixels along a row.
+    width: u64,
+    /// Rows.
+    height: u64,
+    /// Samples of a pixel: 1 grey, 2 with opacity, 3 colour, 4 with opacity.
+    channels: u64,
+    /// Bits of a sample.
+    bits: u32,
 }
 
 /// The report of this command.
@@ -91,6 +106,12 @@ fn look(job: &mut Job) -> Result<Found<Params, Stats>> {
             summary += &format!(", {} set", stats.set);
             Stats::Volume(stats)
         }
+        Content::Image(image) => Stats::Image(ImageStats {
+            width: image.width as u64,
+            height: image.height as u64,
+            channels: image.channels as u64,
+            bits: image.bits(),
+        }),
     };
     Ok(Found::new(Params {}, stats, summary))
 }

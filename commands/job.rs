@@ -8,6 +8,7 @@ use crate::progress::Recorder;
 use crate::streams::{complain, say};
 use crate::words;
 use scantle::error::{Error, Result};
+use scantle::image::samples::Image;
 use scantle::io::format::{Format, Kind};
 use scantle::io::sink::Sink;
 use scantle::io::source::Source;
@@ -173,6 +174,11 @@ impl<'a> Job<'a> {
         self.read_with(io::read_volume)
     }
 
+    /// Reads the next input, which must be an image.
+    pub fn read_image(&mut self) -> Result<Image> {
+        self.read_with(io::read_image)
+    }
+
     fn read_with<T>(
         &mut self,
         reader: impl Fn(&Source, Option<Format>) -> Result<(T, Input, Vec<Warning>)>,
@@ -185,6 +191,20 @@ impl<'a> Job<'a> {
         self.read.push(input);
         self.warn(warnings);
         Ok(content)
+    }
+
+    /// Errors when what is about to be made needs more bytes than may be held.
+    pub fn expect_room(&self, what: &str, needed: u128) -> Result<()> {
+        let limit = self.context.memory();
+        if needed > u128::from(limit) {
+            return Err(Error::over_memory(
+                what,
+                needed,
+                limit,
+                Some("raise --max-memory"),
+            ));
+        }
+        Ok(())
     }
 
     /// What the report says about the input read last.

@@ -12,7 +12,7 @@ use crate::streams::{say, show};
 use crate::wrapped::Wrapped;
 use result::{Asked, Outcome, Row, Stats};
 use scantle::error::Result;
-use scantle::io::format::{Format, Kind};
+use scantle::io::format::Format;
 use scantle::io::sink::Sink;
 use scantle::io::source::Source;
 use scantle::io::{self, Content};
@@ -332,9 +332,8 @@ fn drift(reference: &Made, made: &Made, motion: &Motion) -> Result<Drift, Failed
             code: Exit::of(&error) as u8,
             message: error.to_string(),
         }),
-        _ => {
-            let (a, b) = (Kind::Volume.name(), Kind::Mesh.name());
-            Err(unfit(format!("one result is a {a}, the other a {b}")))
-        }
+        _ => Err(unfit(
+            "the results are not of one kind that drift is measured for".to_owned(),
+        )),
     }
 }

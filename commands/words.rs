@@ -34,6 +34,11 @@ pub fn content(content: &Content) -> String {
         let sample = content.sample_type.as_deref().unwrap_or("unknown type");
         parts.push(format!("{x} x {y} x {z} voxels of {sample}"));
     }
+    if let Some([x, y]) = content.pixels {
+        let (channels, bits) = (content.channels.unwrap_or(0), content.bits.unwrap_or(0));
+        let channels = counted(channels, "channel", "channels");
+        parts.push(format!("{x} x {y} pixels, {channels} of {bits} bits"));
+    }
     parts.join(", ")
 }
 

@@ -76,6 +76,15 @@ pub struct Content {
     /// Type of a voxel.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sample_type: Option<String>,
+    /// Pixels along a row and rows of an image.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub pixels: Option<[u64; 2]>,
+    /// Samples of a pixel: 1 grey, 2 with opacity, 3 colour, 4 with opacity.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub channels: Option<u64>,
+    /// Bits of a sample of an image.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub bits: Option<u32>,
     /// Smallest and largest coordinate: `[[x, y, z], [x, y, z]]`, null when there is none.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub bounds: Option<[[f64; 3]; 2]>,

@@ -12,7 +12,7 @@ const MAY_USE: &[(&str, &[&str])] = &[
     ("trade", &[]),
     ("numeric", &["error"]),
     ("spatial", &["error", "numeric", "progress"]),
-    ("image", &["error", "numeric"]),
+    ("image", &["error", "numeric", "report"]),
     (
         "mesh",
         &["error", "numeric", "progress", "report", "spatial"],

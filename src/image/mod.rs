@@ -9,4 +9,5 @@ pub mod font;
 pub mod plot;
 pub mod png;
 pub mod raster;
+pub mod samples;
 pub mod text;

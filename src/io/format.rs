@@ -9,6 +9,8 @@ pub enum Kind {
     Mesh,
     /// Voxels.
     Volume,
+    /// Pixels.
+    Image,
 }
 
 impl Kind {
@@ -17,6 +19,16 @@ impl Kind {
         match self {
             Kind::Mesh => "mesh",
             Kind::Volume => "volume",
+            Kind::Image => "image",
+        }
+    }
+
+    /// The name after `a` or `an`.
+    pub fn with_article(self) -> &'static str {
+        match self {
+            Kind::Mesh => "a mesh",
+            Kind::Volume => "a volume",
+            Kind::Image => "an image",
         }
     }
 }
@@ -52,6 +64,8 @@ pub enum Format {
     Vdb,
     /// scantle's sparse voxel octree.
     Svo,
+    /// Portable Network Graphics.
+    Png,
 }
 
 /// What of a mesh a format can hold beside triangles.
@@ -193,6 +207,13 @@ const TABLE: &[Row] = &[
         (true, true),
         "scantle's sparse voxel octree: 8-bit child masks, breadth first",
     ),
+    row(
+        Format::Png,
+        &["png"],
+        Kind::Image,
+        (true, false),
+        "PNG: grey, colour and palette of up to 16 bits, with or without opacity",
+    ),
 ];
 
 impl Format {
@@ -317,6 +338,9 @@ pub fn sniff(bytes: &[u8], extension: Option<&str>) -> Result<Format, Fault> {
     }
     if bytes.starts_with(super::svo::MAGIC) {
         return Ok(Format::Svo);
+    }
+    if bytes.starts_with(super::png::MAGIC) {
+        return Ok(Format::Png);
     }
     if bytes.starts_with(super::vdb::MAGIC) {
         return Ok(Format::Vdb);

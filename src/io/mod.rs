@@ -17,6 +17,7 @@ pub mod off;
 #[cfg(test)]
 mod peers;
 pub mod ply;
+pub mod png;
 mod samples;
 pub mod sink;
 pub mod source;
@@ -30,6 +31,7 @@ pub mod vti;
 mod roundtrip;
 
 use crate::error::{Error, Fault, Result};
+use crate::image::samples::Image;
 use crate::mesh::{Mesh, Polygons};
 use crate::report::{Input, Output, Warning};
 use crate::volume::Volume;
@@ -46,6 +48,19 @@ pub enum Content {
     Mesh(Mesh),
     /// Voxels.
     Volume(Volume),
+    /// Pixels.
+    Image(Image),
+}
+
+impl Content {
+    /// Its kind.
+    pub fn kind(&self) -> Kind {
+        match self {
+            Content::Mesh(_) => Kind::Mesh,
+            Content::Volume(_) => Kind::Volume,
+            Content::Image(_) => Kind::Image,
+        }
+    }
 }
 
 /// Reads a file of any kind.
@@ -70,6 +85,7 @@ pub fn read(source: &Source, format: Option<Format>) -> Result<(Content, Input, 
     let described = match &content {
         Content::Mesh(mesh) => mesh.content(),
         Content::Volume(volume) => volume.content(),
+        Content::Image(image) => image.content(),
     };
     let input = Input {
         path: source.name().to_owned(),
@@ -93,6 +109,7 @@ fn parse(source: &Source, format: Format, warnings: &mut Vec<Warning>) -> Result
         Format::Npy => Content::Volume(npy::read(source, warnings)?),
         Format::Binvox => Content::Volume(binvox::read(source, warnings)?),
         Format::Svo => Content::Volume(svo::read(source, warnings)?),
+        Format::Png => Content::Image(png::read(source)?),
         Format::Vti | Format::Vdb => {
             return Err(Fault::whole(format!(
                 "{} files are written, not read",
@@ -103,6 +120,7 @@ fn parse(source: &Source, format: Format, warnings: &mut Vec<Warning>) -> Result
     match &content {
         Content::Mesh(mesh) => mesh.check()?,
         Content::Volume(volume) => volume.check()?,
+        Content::Image(image) => image.check()?,
     }
     Ok(content)
 }
@@ -111,7 +129,7 @@ fn parse(source: &Source, format: Format, warnings: &mut Vec<Warning>) -> Result
 pub fn read_mesh(source: &Source, format: Option<Format>) -> Result<(Mesh, Input, Vec<Warning>)> {
     match read(source, format)? {
         (Content::Mesh(mesh), input, warnings) => Ok((mesh, input, warnings)),
-        (Content::Volume(_), input, _) => Err(wrong_kind(source, &input.format, "volume", "mesh")),
+        (other, input, _) => Err(wrong_kind(source, &input.format, &other, Kind::Mesh)),
     }
 }
 
@@ -122,14 +140,21 @@ pub fn read_volume(
 ) -> Result<(Volume, Input, Vec<Warning>)> {
     match read(source, format)? {
         (Content::Volume(volume), input, warnings) => Ok((volume, input, warnings)),
-        (Content::Mesh(_), input, _) => Err(wrong_kind(source, &input.format, "mesh", "volume")),
+        (other, input, _) => Err(wrong_kind(source, &input.format, &other, Kind::Volume)),
     }
 }
 
-fn wrong_kind(source: &Source, format: &str, found: &str, wanted: &str) -> Error {
-    let fault = Fault::whole(format!(
-        "holds a {found} ({format}), but a {wanted} is needed"
-    ));
+/// Reads an image; a file of another kind is an error.
+pub fn read_image(source: &Source, format: Option<Format>) -> Result<(Image, Input, Vec<Warning>)> {
+    match read(source, format)? {
+        (Content::Image(image), input, warnings) => Ok((image, input, warnings)),
+        (other, input, _) => Err(wrong_kind(source, &input.format, &other, Kind::Image)),
+    }
+}
+
+fn wrong_kind(source: &Source, format: &str, found: &Content, wanted: Kind) -> Error {
+    let (found, wanted) = (found.kind().with_article(), wanted.with_article());
+    let fault = Fault::whole(format!("holds {found} ({format}), but {wanted} is needed"));
     Error::Malformed {
         path: source.path().to_owned(),
         fault,
@@ -219,11 +244,12 @@ fn refusal(volume: &Volume, format: Format) -> Option<String> {
     }
 }
 
-fn cannot_hold(format: Format, kind: Kind) -> Error {
+/// The error of a format that a kind of thing cannot be written to.
+pub fn cannot_hold(format: Format, kind: Kind) -> Error {
     Error::parameter(
         "output-format",
         format.name(),
-        format!("does not hold a {}, or is not written", kind.name()),
+        format!("does not hold {}, or is not written", kind.with_article()),
     )
 }
 

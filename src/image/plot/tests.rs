@@ -42,11 +42,13 @@ fn cost_against_error() -> Plot {
 }
 
 fn texts(scene: &Scene) -> Vec<&Text> {
-    let text = |shape| match shape {
-        &Shape::Text(ref text) => Some(text),
-        _ => None,
-    };
-    scene.shapes.iter().filter_map(text).collect()
+    let mut texts = Vec::new();
+    for shape in &scene.shapes {
+        if let Shape::Text(text) = shape {
+            texts.push(text);
+        }
+    }
+    texts
 }
 
 fn area(text: &Text) -> Area {

@@ -7,16 +7,18 @@
 //! parity and winding number agree or disagree by whole numbers.
 
 use super::kernel::{self, Clip};
-use super::raster::Surface;
+use super::lines;
+use super::raster::{Counts, Surface};
 use super::winding::{Border, Step};
-use super::{Fill, Lattice};
+use super::{Fill, Lattice, Mode};
 use crate::progress::Progress;
 use crate::volume::bits::BitGrid;
 use crate::volume::octree::{TILE, Tile};
 use rayon::prelude::*;
+use std::ops::Range;
 
 /// Triangles per task.
-const CHUNK: usize = 8192;
+const CHUNK: usize = 1024;
 
 /// A run of voxels `x0..x1` in a row of a tile row: `row` is `64 z + y` within it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -36,6 +38,8 @@ pub struct Filling {
     pub disagreeing: u64,
     /// Whether the surface was taken inside out, because it encloses more negative than positive space.
     pub inverted: bool,
+    /// What was counted on the way; nothing unless the surface itself sets no voxels.
+    pub counts: Counts,
 }
 
 /// What a tile holds.
@@ -91,7 +95,7 @@ impl Filling {
         progress: &dyn Progress,
     ) -> Self {
         let dims = lattice.dims;
-        let keys = crossings(surface, dims, progress);
+        let (crossings, counts) = crossings(surface, dims, progress);
         let [_, ty, tz] = dims.map(|d| d.div_ceil(TILE));
         progress.stage("fill", 2 * (ty * tz) as u64);
         let steps: Vec<Vec<Step>> = (0..ty * tz)
@@ -102,21 +106,9 @@ impl Filling {
                 steps
             })
             .collect();
-        let inverted = enclosed(&keys, &steps, dims[0]) < 0;
-        // Empty tile rows have no crossing, and without a border nothing else can fill them.
-        let groups: Vec<&[u64]> = {
-            let mut rest = keys.as_slice();
-            (0..ty * tz)
-                .map(|row| {
-                    let (group, after) =
-                        rest.split_at(rest.partition_point(|k| (k >> ROW_SHIFT) as usize <= row));
-                    rest = after;
-                    group
-                })
-                .collect()
-        };
-        let made: Vec<(Vec<Run>, u64)> = groups
-            .into_par_iter()
+        let inverted = enclosed(&crossings.keys, &steps, dims[0]) < 0;
+        let made: Vec<(Vec<Run>, u64)> = crossings
+            .groups()
             .zip(&steps)
             .map(|(keys, steps)| {
                 let made = tile_row(keys, steps, dims[0] as u32, rule, inverted);
@@ -130,6 +122,7 @@ impl Filling {
             rows: made.into_iter().map(|(runs, _)| runs).collect(),
             disagreeing,
             inverted,
+            counts,
         }
     }
 
@@ -186,36 +179,170 @@ impl Filling {
 /// numbers sorts the crossings.
 const ROW_SHIFT: u32 = 32;
 
-fn crossings(surface: &Surface, dims: [usize; 3], progress: &dyn Progress) -> Vec<u64> {
+fn crossings(surface: &Surface, dims: [usize; 3], progress: &dyn Progress) -> (Crossings, Counts) {
     let clip = Clip::grid(dims);
-    let tiles_y = dims[1].div_ceil(TILE) as u64;
+    let [_, ty, tz] = dims.map(|d| d.div_ceil(TILE));
+    let packing = Packing {
+        nx: dims[0] as i32,
+        tiles_y: ty as u64,
+    };
     let count = surface.triangle_count();
     progress.stage("crossings", count as u64);
-    let chunks: Vec<Vec<u64>> = (0..count.div_ceil(CHUNK))
+    let (chunks, counts): (Vec<Vec<u64>>, Vec<Counts>) = (0..count.div_ceil(CHUNK))
         .into_par_iter()
         .map(|chunk| {
-            let mut keys = Vec::new();
-            let last = ((chunk + 1) * CHUNK).min(count);
-            for index in chunk * CHUNK..last {
-                let q = surface.primitive(index);
-                kernel::crossings(&q, &clip, &mut |x, y, z, turn| {
-                    if x < dims[0] as i32 {
-                        let tile_row = z as u64 / TILE as u64 * tiles_y + y as u64 / TILE as u64;
-                        let row = (z as u64 % TILE as u64) * TILE as u64 + y as u64 % TILE as u64;
-                        let leaves = u64::from(surface.is_reversed(index) != (turn > 0));
-                        keys.push(
-                            tile_row << ROW_SHIFT | row << 20 | (x.max(0) as u64) << 1 | leaves,
-                        );
-                    }
-                });
-            }
-            progress.advance((last - chunk * CHUNK) as u64);
-            keys
+            let triangles = chunk * CHUNK..((chunk + 1) * CHUNK).min(count);
+            let length = triangles.len() as u64;
+            let made = chunk_crossings(surface, triangles, &clip, packing);
+            progress.advance(length);
+            made
         })
-        .collect();
-    let mut keys = chunks.concat();
-    keys.par_sort_unstable();
-    keys
+        .unzip();
+    let counts = counts.into_iter().fold(Counts::default(), Counts::and);
+    (Crossings::sort(&chunks, ty * tz), counts)
+}
+
+/// All crossings, sorted.
+struct Crossings {
+    keys: Vec<u64>,
+    /// Where each row of tiles begins, and where the last one ends.
+    starts: Vec<usize>,
+}
+
+impl Crossings {
+    /// Sorts them by row of tiles first, then each row of tiles on its own.
+    fn sort(chunks: &[Vec<u64>], tile_rows: usize) -> Self {
+        let mut starts = vec![0; tile_rows + 1];
+        for key in chunks.iter().flatten() {
+            starts[(key >> ROW_SHIFT) as usize + 1] += 1;
+        }
+        for row in 0..tile_rows {
+            starts[row + 1] += starts[row];
+        }
+        let mut keys = vec![0; starts[tile_rows]];
+        let mut next = starts.clone();
+        for key in chunks.iter().flatten() {
+            let place = &mut next[(key >> ROW_SHIFT) as usize];
+            keys[*place] = *key;
+            *place += 1;
+        }
+        let mut groups = Vec::with_capacity(tile_rows);
+        let mut rest = keys.as_mut_slice();
+        for row in 0..tile_rows {
+            let (group, after) = rest.split_at_mut(starts[row + 1] - starts[row]);
+            groups.push(group);
+            rest = after;
+        }
+        groups
+            .into_par_iter()
+            .for_each_init(Vec::new, |room, group| sort_tile_row(group, room));
+        Crossings { keys, starts }
+    }
+
+    /// Those of each row of tiles.
+    fn groups(&self) -> impl IndexedParallelIterator<Item = &[u64]> {
+        self.starts
+            .par_windows(2)
+            .map(|ends| &self.keys[ends[0]..ends[1]])
+    }
+}
+
+/// Sorts the crossings of one row of tiles: they are few in each of its many rows.
+fn sort_tile_row(keys: &mut [u64], room: &mut Vec<u64>) {
+    if keys.len() < TILE * TILE / 8 {
+        return keys.sort_unstable();
+    }
+    let mut ends = [0u32; TILE * TILE + 1];
+    for key in keys.iter() {
+        ends[row_of(*key) as usize + 1] += 1;
+    }
+    for row in 0..TILE * TILE {
+        ends[row + 1] += ends[row];
+    }
+    room.clear();
+    room.extend_from_slice(keys);
+    for key in room.iter() {
+        let place = &mut ends[row_of(*key) as usize];
+        keys[*place as usize] = *key;
+        *place += 1;
+    }
+    keys.chunk_by_mut(|a, b| row_of(*a) == row_of(*b))
+        .for_each(<[u64]>::sort_unstable);
+}
+
+/// Packs crossings for a grid; see [`ROW_SHIFT`].
+#[derive(Clone, Copy)]
+struct Packing {
+    nx: i32,
+    tiles_y: u64,
+}
+
+impl Packing {
+    /// The number for a crossing, and whether it is within reach of a voxel.
+    #[inline(always)]
+    fn key(self, [x, y, z]: [i32; 3], leaves: bool) -> (u64, bool) {
+        let tile = TILE as u64;
+        let (at, y, z) = (x.max(0) as u64, y as u64, z as u64);
+        let tile_row = z / tile * self.tiles_y + y / tile;
+        let row = z % tile * tile + y % tile;
+        let key = tile_row << ROW_SHIFT | row << 20 | at << 1 | u64::from(leaves);
+        (key, x < self.nx)
+    }
+}
+
+/// The crossings of some triangles, and, where nobody else looks at all triangles, their count.
+fn chunk_crossings(
+    surface: &Surface,
+    triangles: Range<usize>,
+    clip: &Clip,
+    packing: Packing,
+) -> (Vec<u64>, Counts) {
+    let to_count = surface.mode() == Mode::None;
+    let (mut keys, mut counts) = (Vec::new(), Counts::default());
+    // Those that may cross a line, found before they are looked at closely.
+    let mut reached = Vec::with_capacity(CHUNK);
+    // Those for exact arithmetic, and those that may have no area.
+    let (mut exact, mut flat) = (Vec::new(), Vec::new());
+    for (index, near) in triangles.clone().zip(surface.near_lanes(triangles)) {
+        let reach = lines::reach(&near, clip);
+        if to_count && (reach.unknown || !lines::has_area(&near)) {
+            flat.push(index);
+        }
+        if reach.unknown {
+            exact.push(index);
+        } else if !reach.none {
+            reached.push((index, near, reach));
+        }
+    }
+    for (index, near, reach) in &reached {
+        let reversed = surface.is_reversed(*index);
+        let start = keys.len();
+        let (mut length, mut doubtful) = (start, false);
+        keys.resize(start + reach.len(), 0);
+        for crossing in lines::crossings(near, reach) {
+            doubtful |= crossing.doubtful;
+            let (key, is_seen) = packing.key(crossing.at, crossing.leaves != reversed);
+            keys[length] = key;
+            length += usize::from(crossing.is_there & is_seen);
+        }
+        keys.truncate(if doubtful { start } else { length });
+        if doubtful {
+            exact.push(*index);
+        }
+    }
+    for index in exact {
+        let reversed = surface.is_reversed(index);
+        kernel::crossings(&surface.primitive(index), clip, &mut |x, y, z, turn| {
+            let (key, is_seen) = packing.key([x, y, z], (turn > 0) != reversed);
+            if is_seen {
+                keys.push(key);
+            }
+        });
+    }
+    for index in flat {
+        counts = counts.and(surface.count(index, &surface.lanes(index)));
+    }
+    (keys, counts)
 }
 
 fn voxel(key: u64) -> u32 {

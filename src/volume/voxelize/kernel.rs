@@ -65,6 +65,12 @@ impl Clip {
         self.hi
     }
 
+    /// The lower sides of the first voxel and the upper sides of the last.
+    #[inline(always)]
+    pub fn sides(&self) -> [f64x4; 2] {
+        [self.low, self.high + f64x4::ONE]
+    }
+
     /// All voxels of a grid.
     pub fn grid(dims: [usize; 3]) -> Self {
         Clip::new([0; 3], dims.map(|d| d as i32 - 1))
@@ -80,12 +86,13 @@ fn pick(q: &Triangle, u: usize, v: usize) -> [[f64; 2]; 3] {
 
 /// The smaller number; unlike `f64::min` it need not care for NaN.
 #[inline(always)]
-fn min(a: f64, b: f64) -> f64 {
+pub fn min(a: f64, b: f64) -> f64 {
     if a < b { a } else { b }
 }
 
+/// The larger number.
 #[inline(always)]
-fn max(a: f64, b: f64) -> f64 {
+pub fn max(a: f64, b: f64) -> f64 {
     if a > b { a } else { b }
 }
 
@@ -167,7 +174,7 @@ pub struct Place {
 }
 
 /// Coordinates from the grid's, where rounded differently, are off by less than this many voxels.
-const NEAR: f64 = 1e-9;
+pub const NEAR: f64 = 1e-9;
 /// Up to this many corners inside of a triangle's bounds are cheaper to look at than rows are to solve.
 const FEW: usize = 36;
 

@@ -13,6 +13,7 @@ mod dense;
 mod fill;
 mod kernel;
 mod lattice;
+mod lines;
 mod octants;
 mod pyramid;
 mod raster;
@@ -338,6 +339,10 @@ pub fn voxelize(mesh: &Mesh, params: &Params, progress: &dyn Progress) -> Result
         let (tree, counts) =
             surface.rasterize_sparse(filling.as_ref(), params.max_memory, progress)?;
         (Data::Sparse(tree), counts)
+    };
+    let counts = match (&filling, params.mode) {
+        (Some(filling), Mode::None) => filling.counts,
+        _ => counts,
     };
     progress.stage("pyramid", 0);
     let volume = Volume {

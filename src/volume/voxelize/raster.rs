@@ -86,8 +86,11 @@ impl<'a> Surface<'a> {
         self.mesh.triangles.len()
     }
 
-    /// Number of primitives.
+    /// Number of primitives whose voxels are set; none where only a fill sets any.
     pub fn len(&self) -> usize {
+        if self.mode == Mode::None {
+            return 0;
+        }
         self.mesh.triangles.len() + self.mesh.segments.len() + self.mesh.points.len()
     }
 

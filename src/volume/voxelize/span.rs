@@ -77,7 +77,7 @@ const ROUNDER: f64 = 6_755_399_441_055_744.0;
 ///
 /// A plain cast would check for numbers that do not fit, which doubles the cost of a hot loop.
 #[inline(always)]
-fn nearest(x: f64) -> (f64, f64, i32) {
+pub fn nearest(x: f64) -> (f64, f64, i32) {
     let x = if x > -1e9 { x } else { -1e9 };
     let x = if x < 1e9 { x } else { 1e9 };
     let shifted = x + ROUNDER;

@@ -5,28 +5,31 @@
 //! along +x makes it a whole number, which the signed crossings of the line from the point towards
 //! -x count exactly: that line runs beside the strips and never through one. What is left is the
 //! solid angle of the strips, in closed form per border edge. So the cost follows the length of the
-//! border and not the area of the surface, nothing is approximated by expansions, and only whether
-//! it exceeds a half-integer has to be known: whole boxes of voxels are settled at once by a bound on
-//! its gradient (Biot and Savart's law for the border as a wire), and from box to smaller box only
-//! the edges near enough to change it much are followed.
+//! border and not the area of the surface.
+//!
+//! Only on which side of a half-integer it is has to be known. As the eye moves through a box the sum
+//! changes smoothly, by what the edges sweep, and by whole numbers where a strip is passed; the
+//! smooth part settles whole boxes at once, and exact predicates count the jumps between rows. From
+//! box to smaller box edges are followed one by one while they are near, and by their summed field,
+//! with a bound on its error, once they are far. A voxel too near to a half for that is summed
+//! directly, so that every answer is the direct sum's.
 
-use super::kernel::beside;
+mod descent;
+mod edge;
+mod field;
+
+use self::descent::{Block, Descent};
+use self::edge::Edge;
 use super::lattice::Lattice;
 use crate::mesh::Mesh;
-use crate::mesh::distance::point_segment;
 use crate::mesh::identify::identify;
-use crate::numeric::vector::{Vec3, cross, dot, length, sub};
+use crate::numeric::vector::Vec3;
+use crate::numeric::vector::{cross, length, sub};
 use crate::volume::octree::TILE;
 use rayon::prelude::*;
-use std::f64::consts::PI;
 
-/// How much of a winding number all edges that are not followed may be off together: a tenth, so that
-/// a point far from the border is settled without them.
-const FAR: f64 = 0.1;
 /// A winding number this near to a half is one: centres in the plane of an opening.
 const TIE: f64 = 1e-9;
-/// Rounding of one edge's solid angle, generously.
-const ROUNDING: f64 = 1e-12;
 
 /// From voxel `x` on, the centres of a row have this much taken from their crossings.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -48,53 +51,46 @@ pub struct Border {
     pub reversed: Vec<bool>,
 }
 
-/// A border edge in grid coordinates; it counts `times`-fold.
-#[derive(Debug, Clone, Copy)]
-struct Edge {
-    a: Vec3,
-    b: Vec3,
-    times: f64,
-}
-
-/// A box of voxels, `hi` not included.
-#[derive(Debug, Clone, Copy)]
-struct Block {
-    lo: [u32; 3],
-    hi: [u32; 3],
-}
-
 /// Whether every edge of the mesh is passed as often one way as the other, by position.
 ///
-/// A sum over directed edges of a 128-bit hash that changes sign with the direction: it is 0 for a
-/// surface without border, and 0 for another one with a probability of 2^-128.
+/// With two random numbers A and B for each place, A(a) B(b) - A(b) B(a) changes sign with the
+/// direction of an edge `a b`. Its sum over all edges, modulo 2^128, is 0 for a surface without
+/// border; for another one it is a polynomial of degree two in these numbers, not 0, and vanishes with
+/// a probability of about 2^-62 (Schwartz 1980).
 pub fn has_no_border(mesh: &Mesh) -> bool {
-    let mix = |mut z: u64| {
-        z = (z ^ (z >> 32)).wrapping_mul(0xd6e8_feb8_6659_fd93);
-        z = (z ^ (z >> 32)).wrapping_mul(0xd6e8_feb8_6659_fd93);
-        z ^ (z >> 32)
+    let product = |a: u64, b: u64| {
+        let wide = u128::from(a) * u128::from(b);
+        (wide >> 64) as u64 ^ wide as u64
     };
-    let place = |v: u32| {
-        let p = mesh.positions[v as usize].map(|c| (c + 0.0).to_bits());
-        mix(p[0] ^ mix(p[1] ^ mix(p[2])).rotate_left(1))
+    let place = |p: &Vec3| {
+        let [x, y, z] = p.map(|c| (c + 0.0).to_bits());
+        let [i, j, k] = [
+            0x9e37_79b9_7f4a_7c15,
+            0xd6e8_feb8_6659_fd93,
+            0xbf58_476d_1ce4_e5b9,
+        ];
+        let xy = product(x ^ i, y ^ j);
+        product(product(xy ^ j, z ^ k) ^ k, i)
+    };
+    let places: Vec<u64> = mesh.positions.par_iter().map(place).collect();
+    // Two numbers of 63 bits, so that differences have a sign.
+    let pair = |v: u32| {
+        let a = places[v as usize];
+        let b = (a ^ (a >> 29)).wrapping_mul(0xd6e8_feb8_6659_fd93);
+        ((a >> 1) as i64, ((b ^ (b >> 32)) >> 1) as i64)
+    };
+    let area = |a: i64, b: i64| i128::from(a) * i128::from(b);
+    let around = |t: &[u32; 3]| {
+        let [(a, a1), (b, b1), (c, c1)] = t.map(pair);
+        area(a, b1 - c1)
+            .wrapping_add(area(b, c1 - a1))
+            .wrapping_add(area(c, a1 - b1))
     };
     let sum = mesh
         .triangles
-        .par_iter()
-        .map(|t| {
-            let h = t.map(place);
-            (0..3).fold(0u128, |sum, i| {
-                let (a, b) = (h[i], h[(i + 1) % 3]);
-                let (low, high) = (a.min(b), a.max(b));
-                let edge = u128::from(mix(low ^ high.rotate_left(17))) << 64
-                    | u128::from(mix(low.wrapping_add(high.rotate_left(41))));
-                match a.cmp(&b) {
-                    std::cmp::Ordering::Less => sum.wrapping_add(edge),
-                    std::cmp::Ordering::Greater => sum.wrapping_sub(edge),
-                    std::cmp::Ordering::Equal => sum,
-                }
-            })
-        })
-        .reduce(|| 0, u128::wrapping_add);
+        .par_chunks(1 << 14)
+        .map(|chunk| chunk.iter().map(around).fold(0, i128::wrapping_add))
+        .reduce(|| 0, i128::wrapping_add);
     sum == 0
 }
 
@@ -146,36 +142,7 @@ impl Border {
         if self.edges.is_empty() {
             return Vec::new();
         }
-        let lo = [0, at[0] * TILE, at[1] * TILE];
-        let hi = [
-            dims[0],
-            dims[1].min(lo[1] + TILE),
-            dims[2].min(lo[2] + TILE),
-        ];
-        let block = Block {
-            lo: lo.map(|c| c as u32),
-            hi: hi.map(|c| c as u32),
-        };
-        let mut steps = Vec::new();
-        let mut stack = vec![self.afresh(block)];
-        while let Some(task) = stack.pop() {
-            match self.settle(&task) {
-                Settled::All(doubled) => {
-                    let block = task.block;
-                    for z in block.lo[2]..block.hi[2] {
-                        for y in block.lo[1]..block.hi[1] {
-                            let row = (z - lo[2] as u32) * TILE as u32 + (y - lo[1] as u32);
-                            steps.push(Step {
-                                row,
-                                x: block.lo[0],
-                                doubled,
-                            });
-                        }
-                    }
-                }
-                Settled::Split(halves) => stack.extend(halves),
-            }
-        }
+        let mut steps = Descent::through(&self.edges, tile_row(at, dims)).steps;
         steps.sort_unstable_by_key(|s| (s.row, s.x));
         // Only changes matter, and a row starts at 0.
         let mut kept: Vec<Step> = Vec::new();
@@ -191,90 +158,25 @@ impl Border {
         kept
     }
 
-    /// A box of which nothing is known.
-    fn afresh(&self, block: Block) -> Task {
-        Task {
-            block,
-            near: (0..self.edges.len() as u32).collect(),
-            known: None,
-            slack: 0.0,
-        }
-    }
-
-    /// What all strips together take at a point.
-    fn taken(&self, p: Vec3) -> f64 {
-        self.edges.iter().map(|e| e.taken(p)).sum()
-    }
-
-    /// Settles a box, or says how to split it.
-    fn settle(&self, task: &Task) -> Settled {
-        let block = &task.block;
-        let size: [u32; 3] = std::array::from_fn(|a| block.hi[a] - block.lo[a]);
-        let centre: Vec3 =
-            std::array::from_fn(|a| 0.5 * (f64::from(block.lo[a]) + f64::from(block.hi[a])));
-        let edge = |index: &u32| &self.edges[*index as usize];
-        let one_row = size[1] == 1 && size[2] == 1;
-        if !one_row && task.near.iter().any(|e| edge(e).may_cross(block)) {
-            // The sum jumps at the strips: the box must get narrower before it says anything.
-            let axis = if size[2] > size[1] { 2 } else { 1 };
-            return Settled::Split(block.halves(axis).map(|half| self.afresh(half)));
-        }
-        let value = match task.known {
-            None => self.taken(centre),
-            Some((from, value)) => {
-                let swept = task.near.iter().map(|e| edge(e).swept(from, centre));
-                value + swept.sum::<f64>()
-            }
-        };
-        let radius = 0.5 * length(size.map(|s| f64::from(s - 1)));
-        let share = 0.5 * (FAR - task.slack).max(0.0) / task.near.len().max(1) as f64;
-        let mut slack = task.slack + task.near.len() as f64 * ROUNDING;
-        let mut bound = 0.0;
-        let mut rest = Vec::with_capacity(task.near.len());
-        for index in &task.near {
-            let change = edge(index).change(block, centre, radius);
-            if change <= share {
-                slack += change;
-            } else {
-                bound += change;
-                rest.push(*index);
-            }
-        }
-        let (total, open) = (value + 0.5, slack + bound);
-        let (low, high) = ((total - open).floor(), (total + open).floor());
-        if low == high {
-            return Settled::All(2 * low as i64);
-        }
-        if size == [1; 3] {
-            // What was left out on the way decides here, so nothing is.
-            return Settled::All(doubled(self.taken(centre)));
-        }
-        let axis = (0..3).max_by_key(|a| (size[*a], 3 - *a)).unwrap_or(0);
-        Settled::Split(block.halves(axis).map(|half| {
-            // So near an edge rounding could sweep it past the wrong side of a centre, unless the
-            // rows' own sides decide.
-            if bound == f64::INFINITY && !one_row {
-                return self.afresh(half);
-            }
-            Task {
-                block: half,
-                near: rest.clone(),
-                known: Some((centre, value)),
-                slack,
-            }
-        }))
+    /// How many times [`Border::steps`] looks at an edge.
+    #[cfg(test)]
+    pub fn work(&self, at: [usize; 2], dims: [usize; 3]) -> u64 {
+        Descent::through(&self.edges, tile_row(at, dims)).work
     }
 }
 
-/// A box to be settled, and what is known from the box it is a half of.
-struct Task {
-    block: Block,
-    /// The edges that change the sum by more than the slack within the box.
-    near: Vec<u32>,
-    /// A point and the sum of all edges there.
-    known: Option<(Vec3, f64)>,
-    /// How much the other edges change the sum from that point to any of the box, and rounding.
-    slack: f64,
+/// The voxels of a row of tiles.
+fn tile_row(at: [usize; 2], dims: [usize; 3]) -> Block {
+    let lo = [0, at[0] * TILE, at[1] * TILE];
+    let hi = [
+        dims[0],
+        dims[1].min(lo[1] + TILE),
+        dims[2].min(lo[2] + TILE),
+    ];
+    Block {
+        lo: lo.map(|c| c as u32),
+        hi: hi.map(|c| c as u32),
+    }
 }
 
 /// Twice a sum, rounded to an even number, or to an odd one where it is a half-integer up to rounding.
@@ -285,103 +187,6 @@ fn doubled(sum: f64) -> i64 {
     } else {
         2 * (sum + 0.5).floor() as i64
     }
-}
-
-/// What came of a box.
-enum Settled {
-    /// All its centres have this taken; see [`Step::doubled`].
-    All(i64),
-    /// Look at the halves.
-    Split([Task; 2]),
-}
-
-impl Block {
-    /// The two halves along an axis.
-    fn halves(&self, axis: usize) -> [Block; 2] {
-        let middle = self.lo[axis] + (self.hi[axis] - self.lo[axis]) / 2;
-        let mut halves = [*self; 2];
-        halves[0].hi[axis] = middle;
-        halves[1].lo[axis] = middle;
-        halves
-    }
-}
-
-impl Edge {
-    /// The share of the strip from this edge to infinity along +x in the winding number at `p`.
-    fn taken(&self, p: Vec3) -> f64 {
-        let (u, v) = (sub(self.a, p), sub(self.b, p));
-        let (lu, lv) = (length(u), length(v));
-        // The strip is wound against the edge: b, a, infinity.
-        let turn = beside([self.b[1], self.b[2]], [self.a[1], self.a[2]], [p[1], p[2]]);
-        if turn == 0 || lu == 0.0 || lv == 0.0 {
-            return 0.0;
-        }
-        // On the ray from an end the strip takes what it takes beside it, on the side to which
-        // `beside` moves the point, +y: half of the lune between the ray and the strip.
-        let on_ray = |w: Vec3| w[1] == 0.0 && w[2] == 0.0 && w[0] < 0.0;
-        for (end, other) in [(u, v), (v, u)] {
-            if on_ray(end) {
-                let lune = other[2].abs().atan2(-other[1]);
-                return self.times * lune * f64::from(turn) / (2.0 * PI);
-            }
-        }
-        // Van Oosterom and Strackee (1983), with the unit vector of +x as the third corner.
-        // The exact turn gives the sign, also to a volume that is rounding error or 0.
-        let volume = cross(v, u)[0].abs() / (lu * lv);
-        let cosines = 1.0 + dot(u, v) / (lu * lv) + u[0] / lu + v[0] / lv;
-        self.times * volume.copysign(f64::from(turn)).atan2(cosines) / (2.0 * PI)
-    }
-
-    /// The share of the parallelogram that this edge sweeps when `from` moves to `to` and the edge
-    /// is seen from it.
-    ///
-    /// Summed over a closed border this is the change of the sum of [`Edge::taken`]; edge by edge it
-    /// is not, since a strip also turns with the rays that bound it, which cancel only among
-    /// neighbours. So far edges can be left out here and not there.
-    fn swept(&self, from: Vec3, to: Vec3) -> f64 {
-        if from[1] == to[1] && from[2] == to[2] {
-            // The rays stay in their lines, and the strips know on which side of the row they run.
-            return self.taken(to) - self.taken(from);
-        }
-        let [a, b] = [sub(self.a, from), sub(self.b, from)];
-        let [a1, b1] = [sub(self.a, to), sub(self.b, to)];
-        self.times * (half_angle(a, b, b1) + half_angle(a, b1, a1)) / (2.0 * PI)
-    }
-
-    /// A bound on the size of [`Edge::swept`] from the middle of a box to any centre in it, infinite
-    /// where the edge may run between them.
-    fn change(&self, block: &Block, centre: Vec3, radius: f64) -> f64 {
-        let to_ball = point_segment(centre, self.a, self.b)
-            .distance_squared
-            .sqrt()
-            - radius;
-        // A row of voxels is much thinner than the ball around it.
-        let apart = |a: usize| {
-            let (low, high) = (f64::from(block.lo[a]) + 0.5, f64::from(block.hi[a]) - 0.5);
-            let below = self.a[a].min(self.b[a]) - high;
-            below.max(low - self.a[a].max(self.b[a])).max(0.0)
-        };
-        let distance = to_ball.max(length([apart(0), apart(1), apart(2)]));
-        if distance <= 0.0 {
-            return f64::INFINITY;
-        }
-        self.times.abs() * length(sub(self.b, self.a)) * radius / (4.0 * PI * distance * distance)
-    }
-
-    /// Whether the strip may run between the rows of a box.
-    fn may_cross(&self, block: &Block) -> bool {
-        (1..3).all(|a| {
-            let (low, high) = (f64::from(block.lo[a]) + 0.5, f64::from(block.hi[a]) - 0.5);
-            self.a[a].min(self.b[a]) <= high && self.a[a].max(self.b[a]) >= low
-        })
-    }
-}
-
-/// Half the solid angle of a triangle at the origin (Van Oosterom and Strackee 1983).
-fn half_angle(a: Vec3, b: Vec3, c: Vec3) -> f64 {
-    let [la, lb, lc] = [a, b, c].map(length);
-    let cosines = la * lb * lc + dot(a, b) * lc + dot(b, c) * la + dot(c, a) * lb;
-    dot(a, cross(b, c)).atan2(cosines)
 }
 
 /// An edge of a triangle: the places of its ends, smaller first; and triangle and direction.

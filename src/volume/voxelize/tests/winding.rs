@@ -305,3 +305,146 @@ fn edges_of_several_sheets_count_as_often_as_they_are_passed() {
     let stats = same("two lids", &lid, [18; 3]);
     assert_eq!(stats.border_edges, Some(4));
 }
+
+/// A soup of triangles whose corners are drawn by `corner`.
+fn soup(triangles: u32, seed: u64, corner: impl Fn(&mut Rng) -> Vec3) -> Mesh {
+    Mesh::from_triangles(
+        (0..3 * triangles)
+            .map(|i| corner(&mut Rng::new(seed, u64::from(i))))
+            .collect(),
+        (0..triangles)
+            .map(|t| [3 * t, 3 * t + 1, 3 * t + 2])
+            .collect(),
+    )
+}
+
+#[test]
+fn soups_across_tiles_fill_as_their_winding_number_says() {
+    let dims = [70, 67, 13];
+    for seed in 0..4 {
+        let mesh = soup(25, 200 + seed, |rng| {
+            let p = dims.map(|d| rng.range(-6.0, d as f64 + 6.0));
+            if seed % 2 == 1 {
+                p.map(|c: f64| (2.0 * c).round() / 2.0)
+            } else {
+                p
+            }
+        });
+        assert_eq!(same("soup", &mesh, dims).border_edges, Some(75));
+    }
+    // The same in small pieces, whose edges are soon too far to be followed.
+    let mesh = soup(60, 300, |rng| dims.map(|d| rng.range(0.0, d as f64)));
+    let small = Mesh::from_triangles(
+        (0..180usize)
+            .map(|i| {
+                let (p, q) = (mesh.positions[i], mesh.positions[i / 3 * 3]);
+                std::array::from_fn(|a| q[a] + 0.1 * (p[a] - q[a]))
+            })
+            .collect(),
+        mesh.triangles.clone(),
+    );
+    same("small pieces", &small, dims);
+}
+
+#[test]
+fn spheres_with_scattered_holes_fill_as_their_winding_number_says() {
+    let dims = [29, 30, 28];
+    for (seed, share) in [(0, 20), (1, 4), (2, 2)] {
+        let sphere = icosphere([14.3, 14.6, 14.1], 12.5, 2);
+        let mesh = kept(sphere, |t, _| Rng::new(seed, t as u64).below(share) != 0);
+        let stats = same("scattered holes", &mesh, dims);
+        assert!(stats.border_edges > Some(30));
+        assert!(stats.set_voxels > 1000, "{}", stats.set_voxels);
+    }
+}
+
+#[test]
+fn borders_along_the_lattice_fill_as_their_winding_number_says() {
+    let dims = [17, 16, 18];
+    for seed in 0..6 {
+        // Right triangles in planes across an axis: every edge but one along an axis, many along x
+        // and through the centres of a row, on even seeds in the planes between voxels.
+        let step = if seed % 2 == 0 { 1.0 } else { 0.5 };
+        let mut mesh = Mesh::default();
+        for i in 0..14 {
+            let mut rng = Rng::new(400 + seed, i);
+            let mut at = |d: usize| (rng.range(-2.0, d as f64 + 2.0) / step).round() * step;
+            let (p, q) = (dims.map(&mut at), dims.map(&mut at));
+            let across = i as usize % 3;
+            let (u, v) = ((across + 1) % 3, (across + 2) % 3);
+            if p[u] == q[u] || p[v] == q[v] {
+                continue;
+            }
+            let (mut b, mut c) = (p, p);
+            b[u] = q[u];
+            c[v] = q[v];
+            mesh = joined(mesh, &Mesh::from_triangles(vec![p, b, c], vec![[0, 1, 2]]));
+        }
+        same("lattice", &mesh, dims);
+    }
+}
+
+#[test]
+fn long_thin_triangles_fill_as_their_winding_number_says() {
+    let dims = [18, 17, 16];
+    for seed in 0..4 {
+        let far = [30.0, 1e3, 1e5, 1e7][seed as usize];
+        // One corner near, one far off, and one beside either.
+        let ends = soup(12, 500 + seed, |rng| dims.map(|d| rng.range(0.0, d as f64)));
+        let mut mesh = ends.clone();
+        for t in 0..12 {
+            let [a, b, c] = [0, 1, 2].map(|i| ends.positions[3 * t + i]);
+            let out = sub(b, a);
+            let aside = sub(c, a);
+            let far = far / length(out);
+            mesh.positions[3 * t + 1] = std::array::from_fn(|i| a[i] + far * out[i]);
+            let from = if t % 2 == 0 {
+                a
+            } else {
+                mesh.positions[3 * t + 1]
+            };
+            mesh.positions[3 * t + 2] = std::array::from_fn(|i| from[i] + 0.3 * aside[i]);
+        }
+        same("needles", &mesh, dims);
+    }
+}
+
+#[test]
+fn doubled_borders_count_twice() {
+    let dims = [18, 18, 18];
+    // Three one way and one the other: twice the same in all, and no two that hang together.
+    let twice = |mesh: &Mesh| {
+        let more = joined(mesh.clone(), &reversed(mesh.clone()));
+        joined(joined(mesh.clone(), mesh), &more)
+    };
+    let open = twice(&open_box([3.2, 4.1, 2.7], [15.3, 12.8, 13.4]));
+    assert_eq!(same("an open box", &open, dims).border_edges, Some(4));
+    let pieces = twice(&soup(10, 600, |rng| {
+        dims.map(|d| rng.range(-3.0, d as f64 + 3.0))
+    }));
+    assert_eq!(same("a soup", &pieces, dims).border_edges, Some(30));
+    same("a soup around an open box", &joined(pieces, &open), dims);
+}
+
+#[test]
+fn work_grows_with_the_surface_where_the_winding_number_is_one_half() {
+    let pieces = soup(40, 700, |rng| [0; 3].map(|_| rng.range(0.0, 1.0)));
+    let work = |n: usize| {
+        let mut mesh = pieces.clone();
+        for p in &mut mesh.positions {
+            *p = p.map(|c| c * n as f64);
+        }
+        let lattice = Lattice {
+            anchor: [0.0; 3],
+            margin: [0.0; 3],
+            h: 1.0,
+            dims: [n; 3],
+        };
+        super::winding::Border::of(&mesh, &lattice).work([0, 0], lattice.dims)
+    };
+    let (coarse, fine) = (work(32), work(64));
+    // Eight times as many voxels, and four times as many near the surface.
+    assert!(fine < 5 * coarse, "{coarse} and {fine}");
+    // A direct sum looks at 120 edges for each voxel.
+    assert!(5 * fine < 120 * 64 * 64 * 64, "{fine}");
+}

@@ -1,0 +1,186 @@
+//! PNG images.
+
+use super::source::Source;
+use crate::error::Fault;
+use crate::image::samples::{Image, Samples};
+use png::{BitDepth, ColorType, Decoder, DecodingError, Limits, Transformations};
+use std::io::Cursor;
+
+/// The first bytes of every PNG file.
+pub(super) const MAGIC: &[u8] = b"\x89PNG\r\n\x1a\n";
+
+/// Reads a PNG image; samples of 16 bits stay so.
+///
+/// Palettes become colours, samples of less than 8 bits are widened to 8, and a transparent colour
+/// becomes a channel of opacity. Errors when the data is damaged or ends early, the image is an
+/// animation, or takes more than the source's limit.
+pub fn read(source: &Source) -> Result<Image, Fault> {
+    let bytes = usize::try_from(source.limit()).unwrap_or(usize::MAX);
+    let mut decoder = Decoder::new_with_limits(Cursor::new(source.bytes()), Limits { bytes });
+    // By the header alone: what it claims is not made room for before.
+    let header = decoder.read_header_info().map_err(damaged)?;
+    let (width, height) = (header.width, header.height);
+    // A palette or a transparent colour may stand for four samples of a byte.
+    let depth = if header.bit_depth == BitDepth::Sixteen {
+        2
+    } else {
+        1
+    };
+    let needed = u128::from(width) * u128::from(height) * 4 * depth;
+    if needed > isize::MAX as u128 {
+        return Err(Fault::whole(format!(
+            "an image of {width} x {height} pixels is larger than memory can be"
+        )));
+    }
+    if needed > u128::from(source.limit()) {
+        return Err(Fault::whole(format!(
+            "an image of {width} x {height} pixels takes up to {needed} bytes to read, over the limit of {} bytes",
+            source.limit()
+        )));
+    }
+    decoder.set_transformations(Transformations::EXPAND);
+    let mut reader = decoder.read_info().map_err(damaged)?;
+    if let Some(animation) = reader.info().animation_control {
+        return Err(Fault::whole(format!(
+            "an animation of {} frames; only single images are read",
+            animation.num_frames
+        )));
+    }
+    let size = reader.output_buffer_size();
+    let size = size.ok_or_else(|| Fault::whole("the image is larger than memory can be"))?;
+    let mut bytes = vec![0; size];
+    reader.next_frame(&mut bytes).map_err(damaged)?;
+    reader.finish().map_err(damaged)?;
+    let (colour, depth) = reader.output_color_type();
+    let channels = match colour {
+        ColorType::Grayscale => 1,
+        ColorType::GrayscaleAlpha => 2,
+        ColorType::Rgb => 3,
+        ColorType::Rgba => 4,
+        ColorType::Indexed => return Err(Fault::whole("the palette's colours are missing")),
+    };
+    let samples = if depth == BitDepth::Sixteen {
+        let (pairs, _) = bytes.as_chunks();
+        Samples::Sixteen(pairs.iter().map(|pair| u16::from_be_bytes(*pair)).collect())
+    } else {
+        Samples::Eight(bytes)
+    };
+    Ok(Image {
+        width: width as usize,
+        height: height as usize,
+        channels,
+        samples,
+    })
+}
+
+fn damaged(e: DecodingError) -> Fault {
+    let said = e.to_string();
+    let problem = if said.starts_with("CRC error") {
+        // The decoder shows its own types here.
+        "the checksum of a chunk does not match its bytes".to_owned()
+    } else {
+        let mut letters = said.trim_end_matches('.').chars();
+        let first = letters.next().map(|c| c.to_ascii_lowercase());
+        first.into_iter().chain(letters).collect()
+    };
+    Fault::whole(format!("the PNG data is damaged: {problem}"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn encoded(colour: ColorType, depth: BitDepth, palette: Option<&[u8]>, data: &[u8]) -> Vec<u8> {
+        let mut out = Vec::new();
+        let mut encoder = png::Encoder::new(&mut out, 2, 2);
+        encoder.set_color(colour);
+        encoder.set_depth(depth);
+        if let Some(palette) = palette {
+            encoder.set_palette(palette.to_vec());
+        }
+        let mut writer = encoder.write_header().expect("a vector takes all");
+        writer.write_image_data(data).expect("as many bytes");
+        writer.finish().expect("a vector takes all");
+        out
+    }
+
+    fn decoded(bytes: Vec<u8>) -> Result<Image, Fault> {
+        let image = read(&Source::from_bytes("test.png", bytes).expect("no gzip layer"))?;
+        image.check()?;
+        Ok(image)
+    }
+
+    #[test]
+    fn all_kinds_of_samples_are_read_as_they_are() {
+        let data: Vec<u8> = (1..=32).collect();
+        let kinds = [
+            (ColorType::Grayscale, 1),
+            (ColorType::GrayscaleAlpha, 2),
+            (ColorType::Rgb, 3),
+            (ColorType::Rgba, 4),
+        ];
+        for (colour, channels) in kinds {
+            let image = decoded(encoded(
+                colour,
+                BitDepth::Eight,
+                None,
+                &data[..4 * channels],
+            ));
+            let image = image.expect("a sound image");
+            assert_eq!(
+                (image.width, image.height, image.channels),
+                (2, 2, channels)
+            );
+            assert_eq!(image.samples, Samples::Eight(data[..4 * channels].to_vec()));
+            let image = decoded(encoded(
+                colour,
+                BitDepth::Sixteen,
+                None,
+                &data[..8 * channels],
+            ));
+            let Samples::Sixteen(words) = image.expect("a sound image").samples else {
+                panic!("16 bits became 8");
+            };
+            assert_eq!((words.len(), words[1]), (4 * channels, 0x0304));
+        }
+    }
+
+    #[test]
+    fn palettes_and_single_bits_become_bytes() {
+        let palette = [9, 8, 7, 250, 251, 252];
+        let bits = [0b0100_0000, 0b1000_0000];
+        let image = decoded(encoded(
+            ColorType::Indexed,
+            BitDepth::One,
+            Some(&palette),
+            &bits,
+        ));
+        let image = image.expect("a sound image");
+        let [dark, light] = [&palette[..3], &palette[3..]];
+        let wanted = [dark, light, light, dark].concat();
+        assert_eq!((image.channels, image.samples), (3, Samples::Eight(wanted)));
+        let image = decoded(encoded(ColorType::Grayscale, BitDepth::One, None, &bits));
+        let wanted = Samples::Eight(vec![0, 255, 255, 0]);
+        assert_eq!(image.expect("a sound image").samples, wanted);
+    }
+
+    #[test]
+    fn no_cut_and_no_changed_byte_panics() {
+        let whole = encoded(ColorType::Rgb, BitDepth::Eight, None, &[77; 12]);
+        for end in 0..whole.len() {
+            assert!(
+                decoded(whole[..end].to_vec()).is_err(),
+                "{end} bytes are enough"
+            );
+        }
+        for at in 0..whole.len() {
+            for bit in 0..8 {
+                let mut changed = whole.clone();
+                changed[at] ^= 1 << bit;
+                if let Ok(image) = decoded(changed) {
+                    assert!(image.pixels() <= 1 << 20);
+                }
+            }
+        }
+    }
+}
