@@ -11,19 +11,22 @@
 
 mod dense;
 mod fill;
-mod kernel;
 mod lattice;
 mod lines;
+mod near_lines;
 mod octants;
+mod overlap;
 mod pyramid;
 mod raster;
 mod span;
 mod trade;
+mod triangle;
 mod winding;
 
-pub use kernel::{Triangle, touches};
 pub use lattice::Lattice;
+pub use overlap::touches;
 pub use trade::TRADE;
+pub use triangle::Triangle;
 
 use super::bits::BitGrid;
 use super::octree::{self, Census};
