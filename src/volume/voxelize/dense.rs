@@ -4,7 +4,8 @@
 //! different extents take different paths. So a block of triangles is fetched first, sorted by extent,
 //! decided extent by extent, and written last.
 
-use super::Mode;
+use super::lines::columns;
+use super::near_lines::{self, Voxel};
 use super::overlap::{Extent, Place, SHAPES, overlap_exact, slices};
 use super::raster::{CHUNK, Counts, Surface};
 use super::span::Span;
@@ -121,20 +122,20 @@ impl Surface<'_> {
         let clip = Clip::grid(grid.dims());
         let words = grid.atomic_words();
         let count = self.len();
-        let in_blocks = match self.mode() {
-            Mode::Conservative => self.triangle_count(),
-            _ => 0,
-        };
         (0..count.div_ceil(CHUNK))
             .into_par_iter()
             .map_init(Scratch::new, |scratch, chunk| {
                 let mut counts = Counts::default();
                 let last = ((chunk + 1) * CHUNK).min(count);
                 for block in (chunk * CHUNK..last).step_by(BLOCK) {
-                    let (middle, end) = (in_blocks.max(block), (block + BLOCK).min(last));
+                    let end = (block + BLOCK).min(last);
+                    let middle = self.triangle_count().max(block);
                     let triangles = block..middle.min(end);
                     let others = triangles.end..end;
-                    counts = counts.and(self.block(triangles, &clip, rows, scratch));
+                    counts = counts.and(match self.mode().axes() {
+                        None => self.block(triangles, &clip, rows, scratch),
+                        Some(axes) => self.columns(triangles, axes, &clip, rows, scratch),
+                    });
                     counts = counts.and(self.each(others, &clip, rows, scratch));
                     write(words, &mut scratch.masks);
                 }
@@ -160,6 +161,53 @@ impl Surface<'_> {
             });
             counts.and(self.count(index, &lanes))
         })
+    }
+
+    /// The voxels in which some triangles meet the lines through centres along some axes.
+    fn columns(
+        &self,
+        triangles: Range<usize>,
+        axes: &[usize],
+        clip: &Clip,
+        rows: Rows,
+        Scratch { masks, .. }: &mut Scratch,
+    ) -> Counts {
+        let [nx, ny, nz] = clip.hi().map(|last| last + 1);
+        let dims = [nx, ny, nz].map(|n| n as usize);
+        let mut counts = Counts::default();
+        for (index, near) in triangles.clone().zip(self.near_lanes(triangles)) {
+            let mut is_small = true;
+            for axis in axes.iter().copied() {
+                let turned = |p| near_lines::turned(p, axis);
+                let q = near.map(turned);
+                let reach = near_lines::reach(&q, clip.sides().map(turned));
+                is_small &= !reach.unknown;
+                if reach.none {
+                    continue;
+                }
+                let (start, mut doubtful) = (masks.len(), reach.unknown);
+                if !doubtful {
+                    for crossing in near_lines::crossings(&q, &reach, Voxel::Holding) {
+                        doubtful |= crossing.doubtful;
+                        if crossing.is_there && !crossing.doubtful {
+                            let [x, y, z] = near_lines::turned_back(crossing.at, axis);
+                            masks.push((rows.start(y, z) + x as usize / 64, 1 << (x & 63)));
+                        }
+                    }
+                }
+                if doubtful {
+                    masks.truncate(start);
+                    let q = self.primitive(index);
+                    columns(&q, axis, dims, clip, &mut |[x, y, z]| {
+                        rows.push(masks, [x, x, y, z])
+                    });
+                }
+            }
+            if !(is_small && near_lines::has_area(&near)) {
+                counts = counts.and(self.count(index, &self.lanes(index)));
+            }
+        }
+        counts
     }
 
     /// The voxels that a block of triangles touches.

@@ -76,6 +76,18 @@ pub enum Mode {
 }
 named!(Mode { Z = "z", ThreeAxis = "three-axis", Conservative = "conservative", None = "none" });
 
+impl Mode {
+    /// The axes along which lines through centres are followed; none where voxels are touched.
+    fn axes(self) -> Option<&'static [usize]> {
+        match self {
+            Mode::Z => Some(&[2]),
+            Mode::ThreeAxis => Some(&[0, 1, 2]),
+            Mode::None => Some(&[]),
+            Mode::Conservative => None,
+        }
+    }
+}
+
 /// Which voxels are set for being inside.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]

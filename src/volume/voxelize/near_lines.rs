@@ -1,11 +1,14 @@
-//! Where small triangles cross the lines through voxel centres along x.
+//! Where small triangles meet the lines through voxel centres along an axis.
 //!
 //! Most triangles of a fine mesh lie between those lines, and of the others most cross one well
 //! away from their edges and from any centre. These are decided in plain arithmetic with an error
-//! bound; the rest is left to [`crossings`](super::lines::crossings), which is exact.
+//! bound; the rest is left to [`columns`](super::lines::columns) and
+//! [`crossings`](super::lines::crossings), which are exact.
+//!
+//! The lines run along x here; for another axis, the triangle is [`turned`] first.
 
 use super::span::{nearest, nearest_index};
-use super::triangle::{Clip, Lanes, NEAR, Triangle, corners, max, min};
+use super::triangle::{Lanes, NEAR, Triangle, corners, max, min};
 use crate::numeric::vector::Vec3;
 use wide::f64x4;
 
@@ -15,6 +18,36 @@ const SMALL: f64 = 16.0;
 /// [`NEAR`] voxels: so twice the area of a triangle between two of its corners and a centre is off by
 /// less than 8 of their products.
 const AREA_ERROR: f64 = 8.0 * SMALL * NEAR;
+
+/// The voxel that stands for a crossing.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub enum Voxel {
+    /// The one that holds it.
+    Holding,
+    /// The first whose centre is not before it.
+    Behind,
+}
+
+/// A point, or a triangle corner by corner, with its coordinate along `axis` first.
+#[inline(always)]
+pub fn turned(p: f64x4, axis: usize) -> f64x4 {
+    let [x, y, z, w] = p.to_array();
+    match axis {
+        0 => p,
+        1 => f64x4::new([y, x, z, w]),
+        _ => f64x4::new([z, x, y, w]),
+    }
+}
+
+/// The voxel that [`turned`] brings to `at`.
+#[inline(always)]
+pub fn turned_back([i, j, k]: [i32; 3], axis: usize) -> [i32; 3] {
+    match axis {
+        0 => [i, j, k],
+        1 => [j, i, k],
+        _ => [j, k, i],
+    }
+}
 
 /// The lines along x that a triangle's bounds meet.
 #[derive(Clone, Copy)]
@@ -38,9 +71,10 @@ impl Reach {
     }
 }
 
-/// Which lines the bounds of a triangle meet; its corners may be off by [`NEAR`] voxels.
+/// Which lines the bounds of a triangle meet, in a grid from `lower` to `upper`; its corners may be off
+/// by [`NEAR`] voxels.
 #[inline(always)]
-pub fn reach(q: &Lanes, clip: &Clip) -> Reach {
+pub fn reach(q: &Lanes, [lower, upper]: [f64x4; 2]) -> Reach {
     let least = q[0].fast_min(q[1]).fast_min(q[2]);
     let greatest = q[0].fast_max(q[1]).fast_max(q[2]);
     // The first centre above a coordinate is in the voxel of the integer nearest to it.
@@ -49,7 +83,6 @@ pub fn reach(q: &Lanes, clip: &Clip) -> Reach {
     let half = f64x4::splat(0.5);
     let off = (least - low).abs().fast_max((greatest - high).abs());
     let near = off.simd_gt(half - f64x4::splat(NEAR));
-    let [lower, upper] = clip.sides();
     let far = (greatest - least).simd_gt(f64x4::splat(SMALL - 2.0))
         | least.simd_lt(lower)
         | greatest.simd_gt(upper);
@@ -81,7 +114,7 @@ pub fn has_area(q: &Lanes) -> bool {
 /// A crossing of a line.
 #[derive(Clone, Copy)]
 pub struct Crossing {
-    /// The voxel: along x the first whose centre is not before the crossing.
+    /// The voxel.
     pub at: [i32; 3],
     /// Whether the line leaves the surface there: the triangle faces +x.
     pub leaves: bool,
@@ -91,15 +124,15 @@ pub struct Crossing {
     pub doubtful: bool,
 }
 
-/// What the lines within a triangle's reach have of it, by the rules of [`crossings`](super::lines::crossings).
+/// What the lines within a triangle's reach have of it.
 #[inline(always)]
-pub fn crossings(q: &Lanes, reach: &Reach) -> impl Iterator<Item = Crossing> {
+pub fn crossings(q: &Lanes, reach: &Reach, voxel: Voxel) -> impl Iterator<Item = Crossing> {
     let ([y0, z0], [ny, nz]) = (reach.first, reach.count);
     let base = f64x4::new([0.0, y0.into(), z0.into(), 0.0]);
     let triangle = corners(&q.map(|corner| corner - base));
     (0..nz).flat_map(move |z| {
         (0..ny).map(move |y| {
-            let crossing = crossing(&triangle, y, z);
+            let crossing = crossing(&triangle, y, z, voxel);
             let [x, ..] = crossing.at;
             Crossing {
                 at: [x, y0 + y, z0 + z],
@@ -111,7 +144,7 @@ pub fn crossings(q: &Lanes, reach: &Reach) -> impl Iterator<Item = Crossing> {
 
 /// What the line through the centres of voxels `(y, z)` has of a triangle.
 #[inline(always)]
-fn crossing([a, b, c]: &Triangle, y: i32, z: i32) -> Crossing {
+fn crossing([a, b, c]: &Triangle, y: i32, z: i32, voxel: Voxel) -> Crossing {
     let (u, v) = (f64::from(y) + 0.5, f64::from(z) + 0.5);
     let beside = |p: &Vec3, q: &Vec3| (p[1] - u) * (q[2] - v) - (p[2] - v) * (q[1] - u);
     let (wa, wb, wc) = (beside(b, c), beside(c, a), beside(a, b));
@@ -119,11 +152,15 @@ fn crossing([a, b, c]: &Triangle, y: i32, z: i32) -> Crossing {
     let leaves = least > AREA_ERROR;
     let is_there = leaves | (greatest < -AREA_ERROR);
     let is_beside = (least < -AREA_ERROR) & (greatest > AREA_ERROR);
-    // The first centre behind it, that of voxel k at k + 1/2. Without branches, so also where there is
-    // none.
+    // Without branches, so also where there is none.
     let area = wa + wb + wc;
     let x = (wb * (b[0] - a[0]) + wc * (c[0] - a[0])) / area + a[0];
     let error = NEAR + 8.0 * SMALL * AREA_ERROR / area.abs();
+    // The centre of voxel k is at k + 1/2, so the first behind x is that of the nearest integer.
+    let x = match voxel {
+        Voxel::Behind => x,
+        Voxel::Holding => x - 0.5,
+    };
     let (_, off, k) = nearest(x);
     let is_sure = (x - off).abs() < 0.5 - error;
     Crossing {

@@ -155,9 +155,7 @@ impl<'a> Surface<'a> {
                 overlap(lanes, clip, rows, emit);
                 &[]
             }
-            Mode::ThreeAxis => &[0, 1, 2],
-            Mode::Z => &[2],
-            Mode::None => &[],
+            mode => mode.axes().unwrap_or(&[]),
         };
         let q = &corners(lanes);
         for axis in axes {
