@@ -3,6 +3,7 @@
 mod hausdorff;
 pub mod image_difference;
 pub mod mesh_distance;
+pub mod report_difference;
 mod surface;
 #[cfg(test)]
 mod test_shapes;
