@@ -15,5 +15,6 @@ mod licences;
 mod malformed;
 mod man;
 mod mutations;
+mod reports;
 mod volumes;
 mod voxelize;
