@@ -2,9 +2,12 @@
 
 use crate::exit::Exit;
 use crate::streams::say;
-use crate::{compare, completions, convert, formats, info, man, schema, voxelize};
+use crate::{
+    compare, completions, convert, formats, info, man, schema, stability, tradeoff, voxelize,
+};
 use clap::error::ErrorKind;
 use clap::{Arg, CommandFactory, FromArgMatches, Parser, Subcommand};
+use std::ffi::OsString;
 use std::fmt::Write;
 
 /// Geometry processing that measures the error it makes
@@ -25,6 +28,8 @@ pub enum Command {
     Info(info::Args),
     Compare(compare::Args),
     Convert(convert::Args),
+    Tradeoff(Box<tradeoff::Args>),
+    Stability(Box<stability::Args>),
     Formats(formats::Args),
     Schema(schema::Args),
     Completions(completions::Args),
@@ -35,6 +40,7 @@ pub enum Command {
 const GROUPS: &[(&str, &[&str])] = &[
     ("Mesh to volume", &["voxelize"]),
     ("Any file", &["info", "convert", "compare"]),
+    ("Any command", &["tradeoff", "stability"]),
     (
         "About scantle",
         &["formats", "schema", "completions", "help"],
@@ -89,10 +95,84 @@ fn grouped(command: &clap::Command) -> String {
     text
 }
 
+/// The commands that run another one, whose words they have among their own.
+const WRAPPING: &[&str] = &["tradeoff", "stability"];
+
+/// Puts the own options of a command that runs another one first, so that they may stand anywhere:
+/// `tradeoff OWN -- COMMAND REST`. The words of other commands stay as they are.
+fn sorted(words: Vec<OsString>, definition: &clap::Command) -> Vec<OsString> {
+    let name = words.get(1).and_then(|word| word.to_str());
+    let Some(wrapper) = name
+        .filter(|name| WRAPPING.contains(name))
+        .and_then(|name| definition.find_subcommand(name))
+    else {
+        return words;
+    };
+    let mut own = words[..2].to_vec();
+    let mut rest = Vec::new();
+    let mut words = words.into_iter().skip(2);
+    while let Some(word) = words.next() {
+        match word.to_str().and_then(|text| own_option(wrapper, text)) {
+            _ if word == "--" => {
+                rest.push(word);
+                rest.extend(words.by_ref());
+            }
+            None => rest.push(word),
+            Some(takes_next) => {
+                own.push(word);
+                own.extend(words.by_ref().take(usize::from(takes_next)));
+            }
+        }
+    }
+    if !rest.is_empty() {
+        own.push("--".into());
+        own.extend(rest);
+    }
+    own
+}
+
+/// Whether a word is an option of a command, and if so whether the next word is its value.
+fn own_option(command: &clap::Command, word: &str) -> Option<bool> {
+    let (name, has_value) = match word.split_once('=') {
+        Some((name, _)) => (name, true),
+        None => (word, false),
+    };
+    if name == "--help" || name == "-h" {
+        return Some(false);
+    }
+    let long = name.strip_prefix("--");
+    let short = name.strip_prefix('-').and_then(|short| {
+        let mut letters = short.chars();
+        letters.next().filter(|_| letters.next().is_none())
+    });
+    let arg = command.get_arguments().find(|arg| {
+        !arg.is_positional()
+            && (long.is_some() && arg.get_long() == long
+                || short.is_some() && arg.get_short() == short)
+    })?;
+    Some(arg.get_action().takes_values() && !has_value)
+}
+
+/// What clap says, without the word before it.
+pub fn message(error: &clap::Error) -> String {
+    let text = error.to_string();
+    let text = text.strip_prefix("error: ").unwrap_or(&text);
+    text.trim_end().to_owned()
+}
+
+/// Parses words that follow the program's name.
+pub fn parse_words(words: &[String]) -> Result<Command, clap::Error> {
+    let words = std::iter::once("scantle").chain(words.iter().map(String::as_str));
+    let matches = command().try_get_matches_from(words)?;
+    Ok(Cli::from_arg_matches(&matches)?.command)
+}
+
 /// Parses the words of this process; says help and usage errors itself.
 pub fn parse() -> Result<Command, Exit> {
-    let parsed = command()
-        .try_get_matches()
+    let definition = command();
+    let words = sorted(std::env::args_os().collect(), &definition);
+    let parsed = definition
+        .try_get_matches_from(words)
         .and_then(|matches| Cli::from_arg_matches(&matches));
     parsed.map(|cli| cli.command).map_err(|error| {
         match error.kind() {
@@ -106,9 +186,7 @@ pub fn parse() -> Result<Command, Exit> {
                 Exit::Usage
             }
             _ => {
-                let text = error.to_string();
-                let text = text.strip_prefix("error: ").unwrap_or(&text);
-                say(text.trim_end());
+                say(message(&error));
                 Exit::Usage
             }
         }
@@ -141,5 +219,28 @@ mod tests {
         listed.sort_unstable();
         there.sort_unstable();
         assert_eq!(listed, there);
+    }
+
+    #[test]
+    fn own_options_of_a_wrapping_command_stand_anywhere() {
+        let sorted = |line: &str| {
+            let words = line.split(' ').map(OsString::from).collect();
+            let sorted = sorted(words, &command());
+            sorted.join(" ".as_ref()).display().to_string()
+        };
+        assert_eq!(
+            sorted("x tradeoff voxelize a.ply --vary mode --fill none -q --repeat=2 --pad 1"),
+            "x tradeoff --vary mode -q --repeat=2 -- voxelize a.ply --fill none --pad 1"
+        );
+        assert_eq!(
+            sorted("x tradeoff -v voxelize -o b.svo -- --vary"),
+            "x tradeoff -v -- voxelize -o b.svo -- --vary"
+        );
+        assert_eq!(sorted("x tradeoff --help"), "x tradeoff --help");
+        assert_eq!(
+            sorted("x tradeoff voxelize -h"),
+            "x tradeoff -h -- voxelize"
+        );
+        assert_eq!(sorted("x info a.ply --vary"), "x info a.ply --vary");
     }
 }

@@ -180,7 +180,7 @@ impl<'a> Context<'a> {
             .try_for_each(Destination::check)?;
         report.iter().try_for_each(destination::check_folder)?;
 
-        let with_bar = !self.common.quiet && progress::is_watched();
+        let with_bar = !self.common.talk.quiet && progress::is_watched();
         let start = Cell::new(self.start);
         let mut lines = Vec::new();
         let mut worst = Exit::Done;
@@ -217,7 +217,7 @@ impl<'a> Context<'a> {
     fn report_sink(&self, outputs: Option<&[(Destination, Format)]>) -> Result<Option<Sink>> {
         let data_on_stdout =
             outputs.is_some_and(|all| all.iter().any(|(place, _)| place.sink == Sink::Stdout));
-        match (self.common.report.as_deref(), data_on_stdout) {
+        match (self.common.report.report.as_deref(), data_on_stdout) {
             (Some("-"), true) => Err(Error::parameter(
                 "report",
                 "-",

@@ -23,6 +23,18 @@ pub enum Exit {
 }
 
 impl Exit {
+    /// The ending of a run that ended with this code; codes that are no promise are the worst.
+    pub fn of_code(code: u8) -> Exit {
+        match code {
+            0 => Exit::Done,
+            1 => Exit::CheckFailed,
+            2 => Exit::Usage,
+            3 => Exit::BadInput,
+            4 => Exit::NotWritten,
+            _ => Exit::OverLimit,
+        }
+    }
+
     /// The ending that an error makes. A reader of standard output that leaves early is no error.
     pub fn of(error: &Error) -> Exit {
         match error {

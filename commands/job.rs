@@ -337,12 +337,12 @@ impl<'a> Job<'a> {
     }
 
     fn tell(&self, summary: &str, stages: &[Stage]) {
-        let common = self.context.common();
-        if common.quiet {
+        let talk = &self.context.common().talk;
+        if talk.quiet {
             return;
         }
         let file = &self.words[0];
-        if common.verbose {
+        if talk.verbose {
             for input in &self.read {
                 say(format_args!("{}: {}", input.path, words::input(input)));
             }
@@ -352,7 +352,7 @@ impl<'a> Job<'a> {
         }
         let written: String = self.written.iter().map(words::output).collect();
         say(format_args!("{file}: {summary}{written}"));
-        if common.verbose {
+        if talk.verbose {
             for stage in stages {
                 let (wall, cpu) = (stage.wall_s, stage.cpu_s);
                 say(format_args!(

@@ -9,10 +9,15 @@ mod destination;
 mod exit;
 mod job;
 mod machine;
+mod places;
 mod progress;
+mod runs;
 mod shared;
 mod streams;
+mod table;
+mod trade;
 mod words;
+mod wrapped;
 
 mod compare;
 mod completions;
@@ -21,26 +26,34 @@ mod formats;
 mod info;
 mod man;
 mod schema;
+mod stability;
+mod tradeoff;
 mod voxelize;
 
 use cli::Command;
+use exit::Exit;
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
-    let command = match cli::parse() {
-        Ok(command) => command,
-        Err(exit) => return exit.into(),
-    };
-    let ended = match &command {
+    match cli::parse() {
+        Ok(command) => run(&command).into(),
+        Err(exit) => exit.into(),
+    }
+}
+
+/// Runs a command; says what went wrong.
+fn run(command: &Command) -> Exit {
+    let ended = match command {
         Command::Voxelize(args) => voxelize::run(args),
         Command::Info(args) => info::run(args),
         Command::Compare(args) => compare::run(args),
         Command::Convert(args) => convert::run(args),
+        Command::Tradeoff(args) => tradeoff::run(args),
+        Command::Stability(args) => stability::run(args),
         Command::Formats(args) => formats::run(args),
         Command::Schema(args) => schema::run(args),
         Command::Completions(args) => completions::run(args),
         Command::Man(args) => man::run(args),
     };
-    let exit = ended.unwrap_or_else(|error| streams::complain(&error, None));
-    exit.into()
+    ended.unwrap_or_else(|error| streams::complain(&error, None))
 }

@@ -78,12 +78,30 @@ pub struct Seed {
     pub seed: u64,
 }
 
-/// What every command that reads files has.
+/// Where the report goes.
 #[derive(Debug, Args)]
-pub struct Common {
+pub struct ReportTo {
     /// Write the JSON report here; `-` for standard output, where it goes by itself
     #[arg(long, value_name = "FILE", help_heading = REPORT)]
     pub report: Option<String>,
+}
+
+/// How much is said on standard error.
+#[derive(Debug, Args)]
+pub struct Talk {
+    /// Say nothing but errors
+    #[arg(short, long, conflicts_with = "verbose", help_heading = TALK)]
+    pub quiet: bool,
+    /// Say what was read and how long each stage took
+    #[arg(short, long, help_heading = TALK)]
+    pub verbose: bool,
+}
+
+/// What every command that reads files has.
+#[derive(Debug, Args)]
+pub struct Common {
+    #[command(flatten)]
+    pub report: ReportTo,
     /// Add the `run` block to the report: seconds, threads, memory, and the seconds of each stage
     #[arg(long, help_heading = REPORT)]
     pub timings: bool,
@@ -93,12 +111,33 @@ pub struct Common {
     /// Refuse to take more memory than this, such as 2GiB or 500MB; by default 80 % of what is free
     #[arg(long, value_name = "SIZE", value_parser = size, help_heading = MACHINE)]
     pub max_memory: Option<u64>,
-    /// Say nothing but errors
-    #[arg(short, long, conflicts_with = "verbose", help_heading = TALK)]
-    pub quiet: bool,
-    /// Say what was read and how long each stage took
-    #[arg(short, long, help_heading = TALK)]
-    pub verbose: bool,
+    #[command(flatten)]
+    pub talk: Talk,
+}
+
+/// What the commands have that run another one.
+#[derive(Debug, Args)]
+pub struct Wrapping {
+    /// The command to run
+    #[arg(value_name = "COMMAND")]
+    pub command: String,
+    /// What it reads, and its options
+    #[arg(value_name = "INPUT")]
+    pub words: Vec<String>,
+    /// Run it in this process rather than in a fresh one each time: faster to start, but memory
+    /// that an earlier run has touched is warm
+    #[arg(long)]
+    pub in_process: bool,
+    /// Draw the table here, as an SVG or PNG picture: the extension says which
+    #[arg(long, value_name = "FILE", help_heading = IN_AND_OUT)]
+    pub plot: Option<String>,
+    /// Write the table here too, as comma-separated values (RFC 4180)
+    #[arg(long, value_name = "FILE", help_heading = IN_AND_OUT)]
+    pub csv: Option<String>,
+    #[command(flatten)]
+    pub report: ReportTo,
+    #[command(flatten)]
+    pub talk: Talk,
 }
 
 fn readable() -> impl TypedValueParser<Value = Format> {
@@ -141,6 +180,15 @@ pub fn not_negative(text: &str) -> Result<f64, String> {
         Ok(number)
     } else {
         Err("must be finite and not negative".to_owned())
+    }
+}
+
+/// A finite number above 0.
+pub fn positive(text: &str) -> Result<f64, String> {
+    match not_negative(text) {
+        Ok(number) if number > 0.0 => Ok(number),
+        Ok(_) => Err("must be finite and above 0".to_owned()),
+        Err(problem) => Err(problem),
     }
 }
 

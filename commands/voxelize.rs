@@ -143,7 +143,7 @@ fn voxelize(job: &mut Job, params: &Params, args: &Args) -> Result<Found<Params,
         .then(|| voxel_error::measure(&mesh, &volume, params, &made.lattice(), job.progress()))
         .transpose()?;
     let accuracy = match &verified {
-        Some(error) => error.accuracy(made.bounds()),
+        Some(error) => error.accuracy(made.bounds(), made.spacing[0]),
         None => made.bounds(),
     };
     match job.output_format().map(scantle::io::format::Format::kind) {

@@ -75,9 +75,32 @@ pub fn warning(warning: &Warning) -> String {
     text
 }
 
+/// Words as one line of shell, quoted where there is need.
+pub fn shell(words: &[String]) -> String {
+    let is_plain = |c: char| c.is_ascii_alphanumeric() || "_@%+=:,./-".contains(c);
+    let quoted: Vec<String> = words
+        .iter()
+        .map(|word| {
+            if !word.is_empty() && word.chars().all(is_plain) {
+                word.clone()
+            } else {
+                format!("'{}'", word.replace('\'', r"'\''"))
+            }
+        })
+        .collect();
+    quoted.join(" ")
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_shell_reads_the_words_back() {
+        let words = ["a b.ply", "it's", "", "--mode=z", "$x", "1,-2.5"].map(str::to_owned);
+        let line = shell(&words);
+        assert_eq!(line, r"'a b.ply' 'it'\''s' '' --mode=z '$x' 1,-2.5");
+    }
 
     #[test]
     fn counts_are_said_in_the_right_number() {

@@ -8,7 +8,7 @@
 //!
 //! | layer | modules |
 //! |---|---|
-//! | 0 | [`error`] [`progress`] [`report`] |
+//! | 0 | [`error`] [`progress`] [`report`] [`trade`] |
 //! | 1 | [`numeric`] |
 //! | 2 | [`spatial`] [`image`] |
 //! | 3 | [`mesh`] [`camera`] |
@@ -28,4 +28,5 @@ pub mod progress;
 pub mod render;
 pub mod report;
 pub mod spatial;
+pub mod trade;
 pub mod volume;

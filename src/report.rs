@@ -1,7 +1,7 @@
 //! The report every command makes: one envelope, one vocabulary.
 
 use schemars::JsonSchema;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use std::collections::BTreeMap;
 
@@ -39,7 +39,7 @@ pub struct Report<P, R> {
 }
 
 /// A file that was read.
-#[derive(Debug, Clone, Serialize, JsonSchema)]
+#[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
 pub struct Input {
     /// As given on the command line; `-` is standard input.
     pub path: String,
@@ -55,7 +55,7 @@ pub struct Input {
 }
 
 /// What a file holds.
-#[derive(Debug, Clone, Default, PartialEq, Serialize, JsonSchema)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Content {
     /// Vertices of a mesh.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -96,7 +96,7 @@ pub struct Content {
 }
 
 /// A file that was written.
-#[derive(Debug, Clone, Serialize, JsonSchema)]
+#[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
 pub struct Output {
     /// Where; `-` is standard output.
     pub path: String,
@@ -150,7 +150,7 @@ pub fn made_by(documents: &[Value]) -> Vec<Made> {
 }
 
 /// One measure of the error made, or several.
-#[derive(Debug, Clone, Serialize, JsonSchema)]
+#[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
 #[serde(untagged)]
 pub enum Measures {
     /// The only one.
@@ -160,7 +160,7 @@ pub enum Measures {
 }
 
 /// One measure of the error made.
-#[derive(Debug, Clone, Serialize, JsonSchema)]
+#[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
 pub struct Accuracy {
     /// What is measured.
     pub measure: String,
@@ -177,7 +177,7 @@ pub struct Accuracy {
 }
 
 /// How much of the full model was built.
-#[derive(Debug, Clone, Serialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Modelled {
     /// What is counted.
     pub unit: String,
@@ -210,7 +210,7 @@ impl Modelled {
 }
 
 /// Something that looks wrong but can be worked with.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub struct Warning {
     /// Stable name for programs: `degenerate-triangles`.
     pub code: String,
@@ -269,7 +269,7 @@ impl Tally {
 }
 
 /// What varies from run to run.
-#[derive(Debug, Clone, Serialize, JsonSchema)]
+#[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
 pub struct Run {
     /// Seconds from start to report.
     pub wall_s: f64,
@@ -284,7 +284,7 @@ pub struct Run {
 }
 
 /// One step of a run.
-#[derive(Debug, Clone, Serialize, JsonSchema)]
+#[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
 pub struct Stage {
     /// `read`, the algorithm's own steps, `write`.
     pub name: String,

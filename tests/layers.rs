@@ -9,6 +9,7 @@ const MAY_USE: &[(&str, &[&str])] = &[
     ("error", &[]),
     ("progress", &[]),
     ("report", &[]),
+    ("trade", &[]),
     ("numeric", &["error"]),
     ("spatial", &["error", "numeric", "progress"]),
     ("image", &["error", "numeric", "report"]),
@@ -22,7 +23,9 @@ const MAY_USE: &[(&str, &[&str])] = &[
     ),
     (
         "volume",
-        &["error", "mesh", "numeric", "progress", "report", "spatial"],
+        &[
+            "error", "mesh", "numeric", "progress", "report", "spatial", "trade",
+        ],
     ),
     (
         "render",
@@ -35,7 +38,7 @@ const MAY_USE: &[(&str, &[&str])] = &[
         "measure",
         &[
             "camera", "error", "image", "mesh", "numeric", "progress", "report", "spatial",
-            "volume",
+            "trade", "volume",
         ],
     ),
     // Data types only: a reader calls no algorithm.

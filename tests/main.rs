@@ -5,6 +5,7 @@
 mod support;
 
 mod atomic;
+mod chapter;
 mod cli;
 mod determinism;
 mod examples;
@@ -15,6 +16,8 @@ mod licences;
 mod malformed;
 mod man;
 mod mutations;
+mod properties;
 mod reports;
+mod trade;
 mod volumes;
 mod voxelize;

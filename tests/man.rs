@@ -9,6 +9,7 @@ fn pages(folder: &Path) -> BTreeMap<String, String> {
     let entries = fs::read_dir(folder).expect("a folder of pages");
     entries
         .map(|entry| entry.expect("a page"))
+        .filter(|entry| entry.path().extension().is_some_and(|e| e == "1"))
         .map(|entry| {
             let text = fs::read_to_string(entry.path()).expect("a page");
             (entry.file_name().display().to_string(), text)

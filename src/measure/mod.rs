@@ -4,8 +4,10 @@ mod hausdorff;
 pub mod image_difference;
 pub mod mesh_distance;
 pub mod report_difference;
+pub mod stability;
 mod surface;
 #[cfg(test)]
 mod test_shapes;
+pub mod tradeoff;
 pub mod volume_difference;
 pub mod voxel_error;

@@ -145,13 +145,20 @@ pub fn measure(
 }
 
 impl VoxelError {
-    /// The proven bounds with what was reached, and the measures that have no bound but 0.
-    pub fn accuracy(&self, mut bounds: Vec<Accuracy>) -> Vec<Accuracy> {
-        let reached = [Some(self.to_surface_max), self.from_surface_max];
+    /// The proven bounds with what was reached, and before the last the measures that have no bound
+    /// but 0.
+    ///
+    /// `bounds` are those of [`voxelize::Stats::bounds`], for voxels of edge `h` in the mesh's unit.
+    pub fn accuracy(&self, mut bounds: Vec<Accuracy>, h: f64) -> Vec<Accuracy> {
+        let either_way = self
+            .from_surface_max
+            .map(|back| self.to_surface_max.max(back) * h);
+        let reached = [Some(self.to_surface_max), self.from_surface_max, either_way];
         for (accuracy, reached) in bounds.iter_mut().zip(reached) {
             accuracy.reached = reached;
             accuracy.verified = reached.is_some();
         }
+        let last = bounds.split_off(bounds.len().min(2));
         let closed = self.leaks.is_some();
         let conservative = bounds.get(1).is_some_and(|b| b.bound == Some(0.0));
         let mut count = |measure: &str,
@@ -192,6 +199,7 @@ impl VoxelError {
             Some(self.not_conservative),
             exact,
         );
+        bounds.extend(last);
         bounds
     }
 }

@@ -159,7 +159,14 @@ fn a_flat_model_has_a_grid_of_one_layer() {
 
 #[test]
 fn the_smallest_and_the_farthest_models_look_like_any_other() {
-    let mesh = icosphere([0.1, 0.2, 0.3], 1.0, 2);
+    // Turned, so that it meets each side of its box, a plane between voxels, in one point alone.
+    let mut mesh = icosphere([0.0; 3], 1.0, 2);
+    let (s, c) = 0.7f64.sin_cos();
+    for [x, y, z] in &mut mesh.positions {
+        (*x, *y) = (c * *x - s * *y, s * *x + c * *y);
+        (*y, *z) = (c * *y - s * *z, s * *y + c * *z);
+        (*x, *y, *z) = (*x + 0.1, *y + 0.2, *z + 0.3);
+    }
     for mode in [Mode::ThreeAxis, Mode::Conservative] {
         let params = Params {
             fill: Fill::Winding,
@@ -171,19 +178,19 @@ fn the_smallest_and_the_farthest_models_look_like_any_other() {
             mesh.positions.iter_mut().for_each(|p| *p = f(*p));
             run(&mesh, &params).1
         };
-        // Not a power of two, so vertices are rounded; the counts may differ by a few ties.
+        // Not a power of two, so vertices are rounded; the counts may differ by a voxel at each side.
         for scale in [1e-30, 1e-300, 1e200] {
             let stats = place(&|p| p.map(|c| c * scale));
             assert_eq!(stats.dims, wanted.dims);
             let found = stats.set_voxels;
             assert!(
-                found.abs_diff(wanted.set_voxels) <= 12,
+                found.abs_diff(wanted.set_voxels) <= 6,
                 "{scale}: {found} for {}",
                 wanted.set_voxels
             );
         }
         let stats = place(&|p| p.map(|c| c + 1e9));
-        assert!(stats.set_voxels.abs_diff(wanted.set_voxels) <= 12);
+        assert!(stats.set_voxels.abs_diff(wanted.set_voxels) <= 6);
         assert_eq!(stats.warnings, []);
     }
     let tiny = cuboid([0.0; 3], [1e-310; 3]);

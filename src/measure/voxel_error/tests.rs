@@ -16,7 +16,8 @@ fn unit(side: usize, mode: Mode) -> Params {
 
 fn lattice(side: usize) -> Lattice {
     Lattice {
-        lo: [0.0; 3],
+        anchor: [0.0; 3],
+        margin: [0.0; 3],
         h: 1.0,
         dims: [side; 3],
     }

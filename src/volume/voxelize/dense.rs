@@ -5,9 +5,10 @@
 //! decided extent by extent, and written last.
 
 use super::Mode;
-use super::kernel::{self, Clip, Extent, Place, SHAPES};
+use super::overlap::{Extent, Place, SHAPES, overlap_exact, slices};
 use super::raster::{CHUNK, Counts, Surface};
 use super::span::Span;
+use super::triangle::Clip;
 use crate::progress::Progress;
 use crate::volume::bits::BitGrid;
 use rayon::prelude::*;
@@ -226,7 +227,7 @@ impl Surface<'_> {
             let [x, y, z] = place.first;
             let [sx, sy, sz] = place.size();
             if (x & 63) as usize + sx > 64 {
-                kernel::slices(&cells, place.first, &mut |x0, x1, y, z| {
+                slices(&cells, place.first, &mut |x0, x1, y, z| {
                     rows.push(masks, [x0, x1, y, z]);
                 });
                 continue;
@@ -245,7 +246,7 @@ impl Surface<'_> {
         }
         for number in many.iter() {
             let lanes = self.lanes(first + number);
-            kernel::overlap_exact(&lanes, clip, spans, &mut |x0, x1, y, z| {
+            overlap_exact(&lanes, clip, spans, &mut |x0, x1, y, z| {
                 rows.push(masks, [x0, x1, y, z]);
             });
             flat.add(number, true);

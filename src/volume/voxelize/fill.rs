@@ -6,11 +6,11 @@
 //! which is nothing for a closed surface. So a closed mesh costs one pass over its triangles, and
 //! parity and winding number agree or disagree by whole numbers.
 
-use super::kernel::{self, Clip};
-use super::lines;
 use super::raster::{Counts, Surface};
+use super::triangle::Clip;
 use super::winding::{Border, Step};
 use super::{Fill, Lattice, Mode};
+use super::{lines, near_lines};
 use crate::progress::Progress;
 use crate::volume::bits::BitGrid;
 use crate::volume::octree::{TILE, Tile};
@@ -304,8 +304,8 @@ fn chunk_crossings(
     // Those for exact arithmetic, and those that may have no area.
     let (mut exact, mut flat) = (Vec::new(), Vec::new());
     for (index, near) in triangles.clone().zip(surface.near_lanes(triangles)) {
-        let reach = lines::reach(&near, clip);
-        if to_count && (reach.unknown || !lines::has_area(&near)) {
+        let reach = near_lines::reach(&near, clip);
+        if to_count && (reach.unknown || !near_lines::has_area(&near)) {
             flat.push(index);
         }
         if reach.unknown {
@@ -319,7 +319,7 @@ fn chunk_crossings(
         let start = keys.len();
         let (mut length, mut doubtful) = (start, false);
         keys.resize(start + reach.len(), 0);
-        for crossing in lines::crossings(near, reach) {
+        for crossing in near_lines::crossings(near, reach) {
             doubtful |= crossing.doubtful;
             let (key, is_seen) = packing.key(crossing.at, crossing.leaves != reversed);
             keys[length] = key;
@@ -332,7 +332,7 @@ fn chunk_crossings(
     }
     for index in exact {
         let reversed = surface.is_reversed(index);
-        kernel::crossings(&surface.primitive(index), clip, &mut |x, y, z, turn| {
+        lines::crossings(&surface.primitive(index), clip, &mut |x, y, z, turn| {
             let (key, is_seen) = packing.key([x, y, z], (turn > 0) != reversed);
             if is_seen {
                 keys.push(key);

@@ -2,7 +2,7 @@
 
 use super::{Params, Size};
 use crate::error::{Error, Fault, Result};
-use crate::numeric::vector::Vec3;
+use crate::numeric::vector::{Vec3, sub};
 use crate::spatial::aabb::Aabb;
 use crate::volume::Frame;
 use crate::volume::octree::MAX_DIM;
@@ -20,8 +20,11 @@ const WHOLE: f64 = 8.0 * f64::EPSILON;
 /// A grid of cubic voxels along the coordinate axes.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Lattice {
-    /// Lower corner of voxel (0, 0, 0), in the mesh's unit.
-    pub lo: Vec3,
+    /// The point that coordinates are taken from, in the mesh's unit: the lower corner of the box
+    /// covered. It moves with the mesh, exactly, so that what is left does not depend on the place.
+    pub anchor: Vec3,
+    /// From the lower corner of voxel (0, 0, 0) to `anchor`, in the mesh's unit.
+    pub margin: Vec3,
     /// Edge of a voxel, in the mesh's unit.
     pub h: f64,
     /// Voxels along x, y, z.
@@ -89,17 +92,27 @@ impl Lattice {
             }
             dims[a] = voxels as usize;
         }
-        let lo = match given {
-            Some(bounds) => bounds.lo,
-            None => {
-                let centre = around.centre();
-                std::array::from_fn(|a| centre[a] - 0.5 * dims[a] as f64 * h)
-            }
+        let margin = match given {
+            Some(_) => [0.0; 3],
+            None => std::array::from_fn(|a| {
+                let covered = (dims[a] as f64 - 2.0 * pad) * h;
+                pad * h + 0.5 * (covered - extent[a])
+            }),
         };
-        Ok(Lattice { lo, h, dims })
+        Ok(Lattice {
+            anchor: around.lo,
+            margin,
+            h,
+            dims,
+        })
     }
 
-    /// A point in grid coordinates: the difference and the quotient are each rounded once.
+    /// Lower corner of voxel (0, 0, 0), in the mesh's unit.
+    pub fn origin(&self) -> Vec3 {
+        sub(self.anchor, self.margin)
+    }
+
+    /// A point in grid coordinates: the difference, the sum and the quotient are each rounded once.
     #[inline]
     pub fn to_grid(&self, p: Vec3) -> Vec3 {
         let [x, y, z, _] = self.in_lanes()(p).to_array();
@@ -109,10 +122,11 @@ impl Lattice {
     /// A function that brings points to grid coordinates, as vectors whose fourth number is 0.
     #[inline(always)]
     pub(super) fn in_lanes(&self) -> impl Fn(Vec3) -> f64x4 {
-        let [x, y, z] = self.lo;
-        let (lo, h) = (f64x4::new([x, y, z, 0.0]), f64x4::splat(self.h));
-        move |[x, y, z]| {
-            let q = (f64x4::new([x, y, z, 0.0]) - lo) / h;
+        let lanes = |[x, y, z]: Vec3| f64x4::new([x, y, z, 0.0]);
+        let (anchor, margin) = (lanes(self.anchor), lanes(self.margin));
+        let h = f64x4::splat(self.h);
+        move |p| {
+            let q = (lanes(p) - anchor + margin) / h;
             q & q.abs().simd_ge(f64x4::splat(SMALLEST))
         }
     }
@@ -121,9 +135,10 @@ impl Lattice {
     /// product instead of a quotient: within the grid they are less than 2^-34 voxels apart.
     #[inline(always)]
     pub(super) fn near_lanes(&self) -> impl Fn(Vec3) -> f64x4 {
-        let [x, y, z] = self.lo;
-        let (lo, per_h) = (f64x4::new([x, y, z, 0.0]), f64x4::splat(1.0 / self.h));
-        move |[x, y, z]| (f64x4::new([x, y, z, 0.0]) - lo) * per_h
+        let lanes = |[x, y, z]: Vec3| f64x4::new([x, y, z, 0.0]);
+        let (anchor, margin) = (lanes(self.anchor), lanes(self.margin));
+        let per_h = f64x4::splat(1.0 / self.h);
+        move |p| (lanes(p) - anchor + margin) * per_h
     }
 
     /// Checks that no coordinate of a mesh with these bounds is too far from the grid to compute with.
@@ -147,7 +162,7 @@ impl Lattice {
 
     /// The same grid as the frame of a volume, which names the centre of the first voxel.
     pub fn frame(&self) -> Frame {
-        let centre = self.lo.map(|c| c + 0.5 * self.h);
+        let centre = std::array::from_fn(|a| self.anchor[a] + (0.5 * self.h - self.margin[a]));
         Frame::straight(self.dims, centre, [self.h; 3])
     }
 }

@@ -1,135 +1,199 @@
-//! Where small triangles cross the lines through voxel centres along x.
+//! Which lines through voxel centres a triangle meets, exact.
 //!
-//! Most triangles of a fine mesh lie between those lines, and of the others most cross one well
-//! away from their edges and from any centre. These are decided in plain arithmetic with an error
-//! bound; the rest is left to [`kernel::crossings`], which is exact.
+//! * [`columns`]: the triangle meets the line through the voxel centres along one axis, in this
+//!   voxel (Forest, Barthe, Paulin 2009, section 2). The union over three axes is the set of voxels
+//!   whose crosshair meets the surface (Laine 2013): 6-separating.
+//! * [`crossings`]: like columns along x, but each line is met by exactly one of the triangles that
+//!   share an edge, for inside and outside.
+//!
+//! Every decision is the one rational arithmetic would make.
 
-use super::kernel::{self, Clip, Lanes, NEAR, Triangle, max, min};
-use super::span::{nearest, nearest_index};
+use super::span::{Sample, ceil, floor};
+use super::triangle::{Clip, Local, Triangle, greatest, least, local_side, pick};
+use crate::numeric::predicates::{orient2d, orient3d};
 use crate::numeric::vector::Vec3;
-use wide::f64x4;
 
-/// Most voxels along an axis of a small triangle.
-const SMALL: f64 = 16.0;
-/// Coordinates relative to the triangle's lowest corner are below [`SMALL`], each off by less than
-/// [`NEAR`] voxels: so twice the area of a triangle between two of its corners and a centre is off by
-/// less than 8 of their products.
-const AREA_ERROR: f64 = 8.0 * SMALL * NEAR;
-
-/// The lines along x that a triangle's bounds meet.
-#[derive(Clone, Copy)]
-pub struct Reach {
-    /// Their first voxels along y and z.
-    first: [i32; 2],
-    /// How many there are along y and z.
-    count: [i32; 2],
-    /// Whether there may be others: the triangle leaves the grid, is not small, or begins or ends too
-    /// near to a centre.
-    pub unknown: bool,
-    /// Whether there is none.
-    pub none: bool,
-}
-
-impl Reach {
-    /// How many lines there are.
-    #[inline(always)]
-    pub fn len(&self) -> usize {
-        (self.count[0] * self.count[1]) as usize
-    }
-}
-
-/// Which lines the bounds of a triangle meet; its corners may be off by [`NEAR`] voxels.
-#[inline(always)]
-pub fn reach(q: &Lanes, clip: &Clip) -> Reach {
-    let least = q[0].fast_min(q[1]).fast_min(q[2]);
-    let greatest = q[0].fast_max(q[1]).fast_max(q[2]);
-    // The first centre above a coordinate is in the voxel of the integer nearest to it.
-    let (low, first) = nearest_index(least);
-    let (high, last) = nearest_index(greatest);
-    let half = f64x4::splat(0.5);
-    let off = (least - low).abs().fast_max((greatest - high).abs());
-    let near = off.simd_gt(half - f64x4::splat(NEAR));
-    let [lower, upper] = clip.sides();
-    let far = (greatest - least).simd_gt(f64x4::splat(SMALL - 2.0))
-        | least.simd_lt(lower)
-        | greatest.simd_gt(upper);
-    let unknown = near.to_bitmask() & 6 | far.to_bitmask() & 7 != 0;
-    Reach {
-        first: [first[1], first[2]],
-        count: [
-            last[1].wrapping_sub(first[1]),
-            last[2].wrapping_sub(first[2]),
-        ],
-        unknown,
-        none: !unknown & (high.simd_eq(low).to_bitmask() & 6 != 0),
-    }
-}
-
-/// Whether a triangle that [`reach`] knows surely has an area.
-#[inline(always)]
-pub fn has_area(q: &Lanes) -> bool {
-    let (u, v) = (q[1] - q[0], q[2] - q[0]);
-    let turned = |p: f64x4| {
-        let [x, y, z, w] = p.to_array();
-        f64x4::new([y, z, x, w])
+/// Calls `emit(voxel)` for every voxel in which the triangle meets the line through the voxel
+/// centres along `axis`; edges and corners belong to the triangle.
+///
+/// A point on the face between two voxels belongs to the upper one, on the upper face of the grid
+/// (of `dims` voxels) to the last. A triangle seen edge on meets no line.
+#[inline]
+pub fn columns(
+    q: &Triangle,
+    axis: usize,
+    dims: [usize; 3],
+    clip: &Clip,
+    emit: &mut impl FnMut([i32; 3]),
+) {
+    let (u, v) = [(1, 2), (0, 2), (0, 1)][axis];
+    let centres = |a: usize| {
+        (
+            ceil(least(q, a) - 0.5).max(clip.lo()[a]),
+            floor(greatest(q, a) - 0.5).min(clip.hi()[a]),
+        )
     };
-    let normal = u * turned(v) - turned(u) * v;
-    let surely = normal.abs().simd_gt(f64x4::splat(AREA_ERROR));
-    surely.to_bitmask() & 7 != 0
-}
-
-/// A crossing of a line.
-#[derive(Clone, Copy)]
-pub struct Crossing {
-    /// The voxel: along x the first whose centre is not before the crossing.
-    pub at: [i32; 3],
-    /// Whether the line leaves the surface there: the triangle faces +x.
-    pub leaves: bool,
-    /// Whether there is a crossing at all.
-    pub is_there: bool,
-    /// Whether only exact arithmetic can tell.
-    pub doubtful: bool,
-}
-
-/// What the lines within a triangle's reach have of it, by the rules of [`kernel::crossings`].
-#[inline(always)]
-pub fn crossings(q: &Lanes, reach: &Reach) -> impl Iterator<Item = Crossing> {
-    let ([y0, z0], [ny, nz]) = (reach.first, reach.count);
-    let base = f64x4::new([0.0, y0.into(), z0.into(), 0.0]);
-    let triangle = kernel::corners(&q.map(|corner| corner - base));
-    (0..nz).flat_map(move |z| {
-        (0..ny).map(move |y| {
-            let crossing = crossing(&triangle, y, z);
-            let [x, ..] = crossing.at;
-            Crossing {
-                at: [x, y0 + y, z0 + z],
-                ..crossing
-            }
-        })
-    })
-}
-
-/// What the line through the centres of voxels `(y, z)` has of a triangle.
-#[inline(always)]
-fn crossing([a, b, c]: &Triangle, y: i32, z: i32) -> Crossing {
-    let (u, v) = (f64::from(y) + 0.5, f64::from(z) + 0.5);
-    let beside = |p: &Vec3, q: &Vec3| (p[1] - u) * (q[2] - v) - (p[2] - v) * (q[1] - u);
-    let (wa, wb, wc) = (beside(b, c), beside(c, a), beside(a, b));
-    let (least, greatest) = (min(wa, min(wb, wc)), max(wa, max(wb, wc)));
-    let leaves = least > AREA_ERROR;
-    let is_there = leaves | (greatest < -AREA_ERROR);
-    let is_beside = (least < -AREA_ERROR) & (greatest > AREA_ERROR);
-    // The first centre behind it, that of voxel k at k + 1/2. Without branches, so also where there is
-    // none.
-    let area = wa + wb + wc;
-    let x = (wb * (b[0] - a[0]) + wc * (c[0] - a[0])) / area + a[0];
-    let error = NEAR + 8.0 * SMALL * AREA_ERROR / area.abs();
-    let (_, off, k) = nearest(x);
-    let is_sure = (x - off).abs() < 0.5 - error;
-    Crossing {
-        at: [k, y, z],
-        leaves,
-        is_there,
-        doubtful: !(is_beside | (is_there & is_sure)),
+    let mut ranges = [(0, 0); 3];
+    (ranges[u], ranges[v]) = (centres(u), centres(v));
+    ranges[axis] = (floor(least(q, axis)), floor(greatest(q, axis)));
+    if ranges[u].0 > ranges[u].1 || ranges[v].0 > ranges[v].1 {
+        return;
     }
+    let closed = |p: [[f64; 2]; 3], turn: i32, at: [f64; 2]| {
+        (0..3).all(|i| turn * orient2d(p[i], p[(i + 1) % 3], at) >= 0)
+    };
+    each_line(q, axis, ranges, closed, &mut |local, turn, cell| {
+        let point = |k: i32| on_line(axis, cell, f64::from(k));
+        // The plane is met at or above height k when the point there is not beyond it.
+        let reached = |k: i32| turn * orient3d(q[0], q[1], q[2], point(k)) <= 0;
+        let mut k = height(local, axis, cell, ranges, 0.0, ranges[axis], reached);
+        let last = dims[axis] as i32;
+        if k == last && orient3d(q[0], q[1], q[2], point(last)) == 0 {
+            k = last - 1;
+        }
+        if k >= clip.lo()[axis] && k <= clip.hi()[axis] {
+            let mut voxel = [0; 3];
+            (voxel[u], voxel[v], voxel[axis]) = (cell[0], cell[1], k);
+            emit(voxel);
+        }
+    });
+}
+
+/// Calls `emit(x, y, z, turn)` for every line through voxel centres along x that crosses the
+/// triangle: `x` is the first voxel whose centre is not before the crossing (it may lie outside of
+/// the grid), `turn` is 1 where the triangle faces +x and -1 where it faces -x.
+///
+/// Lines that meet an edge or a corner are decided as if moved by (e, e^2) along (y, z) for an
+/// infinitely small e, so of the triangles around it they cross as many as a line beside it.
+#[inline]
+pub fn crossings(q: &Triangle, clip: &Clip, emit: &mut impl FnMut(i32, i32, i32, i32)) {
+    let centres = |a: usize| {
+        (
+            ceil(least(q, a) - 0.5).max(clip.lo()[a]),
+            (ceil(greatest(q, a) - 0.5) - 1).min(clip.hi()[a]),
+        )
+    };
+    let within = (floor(least(q, 0)) - 1, ceil(greatest(q, 0)) + 1);
+    let ranges = [within, centres(1), centres(2)];
+    if ranges[1].0 > ranges[1].1 || ranges[2].0 > ranges[2].1 {
+        return;
+    }
+    let half_open = |p: [[f64; 2]; 3], turn: i32, at: [f64; 2]| {
+        (0..3).all(|i| turn * beside(p[i], p[(i + 1) % 3], at) > 0)
+    };
+    each_line(q, 0, ranges, half_open, &mut |local, turn, cell| {
+        let point = |k: i32| on_line(0, cell, f64::from(k) - 0.5);
+        // Centre k - 1 is before the crossing: the largest such k is the first not before it.
+        let before = |k: i32| turn * orient3d(q[0], q[1], q[2], point(k)) < 0;
+        emit(
+            height(local, 0, cell, ranges, 0.5, within, before),
+            cell[0],
+            cell[1],
+            turn,
+        );
+    });
+}
+
+/// The side of the line `a b` on which `p` lies when moved by (e, e^2); 0 only where `a` is `b`.
+#[inline]
+pub fn beside(a: [f64; 2], b: [f64; 2], p: [f64; 2]) -> i32 {
+    let turn = orient2d(a, b, p);
+    let compare = |x: f64, y: f64| i32::from(x > y) - i32::from(x < y);
+    if turn != 0 {
+        turn
+    } else if a[1] != b[1] {
+        compare(a[1], b[1])
+    } else {
+        compare(b[0], a[0])
+    }
+}
+
+/// The point at height `t` of the line along `axis` through the centres of `cell`.
+#[inline]
+fn on_line(axis: usize, cell: [i32; 2], t: f64) -> Vec3 {
+    let [u, v] = cell.map(|c| f64::from(c) + 0.5);
+    match axis {
+        0 => [t, u, v],
+        1 => [u, t, v],
+        _ => [u, v, t],
+    }
+}
+
+/// Calls `found(local, turn, cell)` for every line along `axis` through cell centres in `ranges`
+/// that the rule `inside` finds in the projected triangle; `turn` is the sign of the normal along
+/// the axis.
+#[inline]
+fn each_line(
+    q: &Triangle,
+    axis: usize,
+    ranges: [(i32, i32); 3],
+    inside: impl Fn([[f64; 2]; 3], i32, [f64; 2]) -> bool,
+    found: &mut impl FnMut(&Local, i32, [i32; 2]),
+) {
+    let (u, v) = [(1, 2), (0, 2), (0, 1)][axis];
+    let local = Local::new(q, ranges);
+    let turn = local.sign(q, axis);
+    if turn == 0 {
+        return;
+    }
+    let seen = local_side(&local, q, u, v);
+    let edges = local.edges((u, v), seen, Sample::Centre, ranges[u].1 - ranges[u].0);
+    for row in 0..=ranges[v].1 - ranges[v].0 {
+        let span = edges.row(row);
+        for i in span.possible.0..=span.possible.1 {
+            let cell = [ranges[u].0 + i, ranges[v].0 + row];
+            if span.is_certain(i) || inside(pick(q, u, v), seen, cell.map(|c| f64::from(c) + 0.5)) {
+                found(&local, turn, cell);
+            }
+        }
+    }
+}
+
+/// The largest `k` in `within` for which `reached(k)` holds, which it does up to the height at
+/// which the line of `cell` meets the plane, shifted up by `shift`; `reached` is asked only where
+/// rounding leaves it open.
+#[inline]
+fn height(
+    local: &Local,
+    axis: usize,
+    cell: [i32; 2],
+    ranges: [(i32, i32); 3],
+    shift: f64,
+    within: (i32, i32),
+    reached: impl Fn(i32) -> bool,
+) -> i32 {
+    let (u, v) = [(1, 2), (0, 2), (0, 1)][axis];
+    let at = [
+        f64::from(cell[0] - ranges[u].0) + 0.5,
+        f64::from(cell[1] - ranges[v].0) + 0.5,
+    ];
+    let [origin, ..] = local.q;
+    let slope = local.n[u] * (at[0] - origin[u]) + local.n[v] * (at[1] - origin[v]);
+    let t = origin[axis] - slope / local.n[axis] + shift + f64::from(ranges[axis].0);
+    // The error of the normal and of the numerator, over a normal that may itself be mostly error.
+    let reach = local.reach;
+    let margin = 512.0
+        * f64::EPSILON
+        * (reach * reach * reach / local.n[axis].abs() + reach + within.1.abs() as f64);
+    let margin = if margin.is_nan() {
+        f64::INFINITY
+    } else {
+        margin
+    };
+    let (mut low, mut high) = (
+        floor(t - margin).max(within.0),
+        floor(t + margin).min(within.1),
+    );
+    if t.is_nan() {
+        (low, high) = within;
+    }
+    while low < high {
+        let middle = low + (high - low + 1) / 2;
+        if reached(middle) {
+            low = middle;
+        } else {
+            high = middle - 1;
+        }
+    }
+    low
 }

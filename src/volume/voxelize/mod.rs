@@ -6,22 +6,27 @@
 //! last slice holds one depth only; here voxels are cubes, the lower face of each belongs to it, and
 //! the upper face of the grid to the last voxel. Conservative voxelization, to which the paper only
 //! points, is the default. What "exact" means: a vertex is brought to grid coordinates by one
-//! subtraction and one division, each rounded to nearest; all that follows is decided as rational
-//! arithmetic would decide it.
+//! difference from a point that moves with the model, one sum and one division, each rounded to
+//! nearest; all that follows is decided as rational arithmetic would decide it.
 
 mod dense;
 mod fill;
-mod kernel;
 mod lattice;
 mod lines;
+mod near_lines;
 mod octants;
+mod overlap;
 mod pyramid;
 mod raster;
 mod span;
+mod trade;
+mod triangle;
 mod winding;
 
-pub use kernel::{Triangle, touches};
 pub use lattice::Lattice;
+pub use overlap::touches;
+pub use trade::TRADE;
+pub use triangle::Triangle;
 
 use super::bits::BitGrid;
 use super::octree::{self, Census};
@@ -276,6 +281,8 @@ pub struct Stats {
     /// What looks wrong.
     #[serde(skip)]
     pub warnings: Vec<Warning>,
+    #[serde(skip)]
+    lattice: Lattice,
 }
 
 /// The voxels that a mesh sets.
@@ -376,7 +383,7 @@ fn describe(
     Stats {
         dims: lattice.dims.map(|d| d as u64),
         spacing: [lattice.h; 3],
-        origin: lattice.lo,
+        origin: lattice.origin(),
         mode: params.mode,
         fill: params.fill,
         set_voxels,
@@ -393,6 +400,7 @@ fn describe(
         octree_nodes: census.made(),
         held_bytes,
         warnings: warnings(mesh, params, counts, inside.as_ref()),
+        lattice: *lattice,
     }
 }
 
@@ -448,7 +456,7 @@ fn warnings(
 }
 
 impl Stats {
-    /// Proven bounds on the error, none of them measured.
+    /// Proven bounds on the error, none of them measured; the last is the one that [`TRADE`] names.
     pub fn bounds(&self) -> Vec<Accuracy> {
         let (to_surface, by) = match self.mode {
             Mode::Conservative => (
@@ -468,9 +476,9 @@ impl Stats {
                 "no bound: what lies between the lines through the centres is missed",
             ),
         };
-        let measure = |measure: &str, bound, reference: &str| Accuracy {
+        let measure = |measure: &str, unit: &str, bound, reference: &str| Accuracy {
             measure: measure.to_owned(),
-            unit: "voxel".to_owned(),
+            unit: unit.to_owned(),
             bound,
             reached: None,
             reference: reference.to_owned(),
@@ -479,24 +487,30 @@ impl Stats {
         vec![
             measure(
                 "largest distance from the centre of a set voxel to the model",
+                "voxel",
                 to_surface,
                 by,
             ),
             measure(
                 "largest distance from the surface to the nearest set voxel",
+                "voxel",
                 missed,
                 why,
+            ),
+            measure(
+                trade::TWO_SIDED.name,
+                trade::TWO_SIDED.unit,
+                to_surface
+                    .zip(missed)
+                    .map(|(there, back)| f64::max(there, back) * self.spacing[0]),
+                "the larger of both distances above, times the edge of a voxel",
             ),
         ]
     }
 
     /// The grid the voxels stand in.
     pub fn lattice(&self) -> Lattice {
-        Lattice {
-            lo: self.origin,
-            h: self.spacing[0],
-            dims: self.dims.map(|d| d as usize),
-        }
+        self.lattice
     }
 
     /// Octree nodes made against the nodes of the full tree.

@@ -266,7 +266,8 @@ impl Small {
 mod tests {
     use super::*;
     use crate::numeric::rng::Rng;
-    use crate::volume::voxelize::kernel::{self, Triangle};
+    use crate::volume::voxelize::overlap::touches;
+    use crate::volume::voxelize::triangle::Triangle;
 
     #[test]
     fn octants_are_those_the_exact_test_finds() {
@@ -289,11 +290,7 @@ mod tests {
             decided += 1;
             for octant in 0..8 {
                 let at = [3 + (octant & 1), 3 + (octant >> 1 & 1), 3 + (octant >> 2)];
-                assert_eq!(
-                    mask >> octant & 1 == 1,
-                    kernel::touches(&q, at, 1),
-                    "{q:?} {at:?}"
-                );
+                assert_eq!(mask >> octant & 1 == 1, touches(&q, at, 1), "{q:?} {at:?}");
             }
         }
         assert!(decided > 25_000, "{decided}");
@@ -321,7 +318,7 @@ mod tests {
             for cell in 0..512 {
                 let at = [cell & 7, cell >> 3 & 7, cell >> 6];
                 let inside = (0..3).all(|a| (at[a] as usize) < size[a]);
-                let wanted = inside && kernel::touches(&q, at.map(|c| c + 7), 1);
+                let wanted = inside && touches(&q, at.map(|c| c + 7), 1);
                 let set = slices[cell as usize >> 6] >> (cell & 63) & 1 == 1;
                 assert_eq!(set, wanted, "{q:?} {at:?} {size:?}");
             }

@@ -2,9 +2,11 @@
 
 use super::Mode;
 use super::fill::{Filling, TileState};
-use super::kernel::{self, Clip, Lanes, Triangle};
 use super::lattice::Lattice;
+use super::lines::columns;
+use super::overlap::overlap;
 use super::span::Span;
+use super::triangle::{Clip, Lanes, Triangle, corners, is_degenerate};
 use crate::error::{Error, Result};
 use crate::mesh::Mesh;
 use crate::progress::Progress;
@@ -97,7 +99,7 @@ impl<'a> Surface<'a> {
     /// A primitive as a triangle, which for a segment or a point has no area.
     #[inline]
     pub fn primitive(&self, index: usize) -> Triangle {
-        kernel::corners(&self.lanes(index))
+        corners(&self.lanes(index))
     }
 
     #[inline(always)]
@@ -146,20 +148,20 @@ impl<'a> Surface<'a> {
     ) {
         let axes: &[usize] = match self.mode {
             Mode::Conservative if self.is_point(index) => {
-                self.set_point(&kernel::corners(lanes), clip, emit);
+                self.set_point(&corners(lanes), clip, emit);
                 &[]
             }
             Mode::Conservative => {
-                kernel::overlap(lanes, clip, rows, emit);
+                overlap(lanes, clip, rows, emit);
                 &[]
             }
             Mode::ThreeAxis => &[0, 1, 2],
             Mode::Z => &[2],
             Mode::None => &[],
         };
-        let q = &kernel::corners(lanes);
+        let q = &corners(lanes);
         for axis in axes {
-            kernel::columns(q, *axis, self.lattice.dims, clip, &mut |[x, y, z]| {
+            columns(q, *axis, self.lattice.dims, clip, &mut |[x, y, z]| {
                 emit(x, x, y, z)
             });
         }
@@ -184,7 +186,7 @@ impl<'a> Surface<'a> {
     #[inline]
     pub(super) fn count(&self, index: usize, lanes: &Lanes) -> Counts {
         let is_triangle = index < self.mesh.triangles.len();
-        if is_triangle && kernel::is_degenerate(&kernel::corners(lanes), self.reach) {
+        if is_triangle && is_degenerate(&corners(lanes), self.reach) {
             Counts {
                 degenerate: 1,
                 first: Some(index as u64),
@@ -261,7 +263,7 @@ impl<'a> Surface<'a> {
                     // Scaling by a power of two is exact, so a tile is found by the same closed test
                     // as a voxel, and no voxel of a tile can be missed.
                     let scaled = lanes.map(|lane| lane * f64x4::splat(1.0 / TILE as f64));
-                    kernel::overlap(&scaled, &clip, rows, &mut |x0, x1, y, z| {
+                    overlap(&scaled, &clip, rows, &mut |x0, x1, y, z| {
                         for x in x0..=x1 {
                             let tile = (z as u64) << 20 | (y as u64) << 10 | x as u64;
                             pairs.push(tile << 32 | index as u64);

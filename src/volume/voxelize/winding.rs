@@ -203,12 +203,15 @@ impl HalfEdge {
     }
 }
 
+/// The edges of all triangles but those with two corners at one place: what these have cancels, and
+/// they would make an edge that two others share look as if it were shared by more.
 fn half_edges(mesh: &Mesh, place: &[u32]) -> Vec<HalfEdge> {
     let of = |(t, corners): (usize, &[u32; 3])| {
         let at = corners.map(|v| u64::from(place[v as usize]));
+        let is_flat = at[0] == at[1] || at[1] == at[2] || at[2] == at[0];
         let edge = move |i: usize| {
             let (a, b) = (at[i], at[(i + 1) % 3]);
-            (a != b).then(|| {
+            (!is_flat).then(|| {
                 HalfEdge(
                     a.min(b) << 32 | a.max(b),
                     (t as u64) << 1 | u64::from(a < b),

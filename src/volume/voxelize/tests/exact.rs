@@ -3,8 +3,10 @@
 //! The oracle shares nothing with the kernel: it clips the triangle to slabs (Sutherland and
 //! Hodgman 1974) in homogeneous integer coordinates, where the kernel asks for orientations.
 
-use super::super::kernel::{Clip, Triangle, columns, crossings, overlap, touches};
+use super::super::lines::{columns, crossings};
+use super::super::overlap::{overlap, touches};
 use super::super::span::Span;
+use super::super::triangle::{Clip, Triangle};
 use crate::numeric::rng::Rng;
 use num_bigint::{BigInt, Sign};
 use num_traits::{One, Zero};

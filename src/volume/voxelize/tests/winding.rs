@@ -435,7 +435,8 @@ fn work_grows_with_the_surface_where_the_winding_number_is_one_half() {
             *p = p.map(|c| c * n as f64);
         }
         let lattice = Lattice {
-            lo: [0.0; 3],
+            anchor: [0.0; 3],
+            margin: [0.0; 3],
             h: 1.0,
             dims: [n; 3],
         };

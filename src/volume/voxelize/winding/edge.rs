@@ -1,6 +1,6 @@
 //! One border edge: the strip from it to infinity, and what it sweeps as the eye moves.
 
-use super::super::kernel::beside;
+use super::super::lines::beside;
 use crate::mesh::distance::point_segment;
 use crate::numeric::predicates::{orient2d, orient3d};
 use crate::numeric::vector::{Vec3, cross, dot, length, scale, sub};

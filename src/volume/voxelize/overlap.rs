@@ -1,151 +1,15 @@
-//! Which voxels a triangle sets: the three rules, exact.
+//! Which voxels a triangle touches: the closed triangle meets the closed cube.
 //!
-//! Triangles come in grid coordinates, in which voxel `(i, j, k)` is the cube from `(i, j, k)` to
-//! `(i + 1, j + 1, k + 1)`. From there on every decision is the one rational arithmetic would make.
-//!
-//! * [`overlap`]: the closed triangle meets the closed cube (Schwarz and Seidel 2010; the separating
-//!   axes of Akenine-Moller 2001). 26-separating.
-//! * [`columns`]: the triangle meets the line through the voxel centres along one axis, in this
-//!   voxel (Forest, Barthe, Paulin 2009, section 2). The union over three axes is the set of voxels
-//!   whose crosshair meets the surface (Laine 2013): 6-separating.
-//! * [`crossings`]: like columns along x, but each line is met by exactly one of the triangles that
-//!   share an edge, for inside and outside.
+//! The test is that of Schwarz and Seidel (2010), with the separating axes of Akenine-Moller (2001).
+//! 26-separating. Every decision is the one rational arithmetic would make.
 
 use super::octants::{self, Small};
-use super::span::{Edges, Plane, Sample, Span, ceil, ceil4, floor, floor4, nearest_index, side};
+use super::span::{Plane, Sample, Span, ceil4, floor4, nearest_index};
+use super::triangle::{
+    Clip, Lanes, Local, NEAR, Triangle, corners, greatest, least, local_side, pick,
+};
 use crate::numeric::predicates::{orient2d, orient3d};
-use crate::numeric::vector::{Vec3, cross, sub};
 use wide::f64x4;
-
-/// A triangle in grid coordinates.
-pub type Triangle = [Vec3; 3];
-
-/// The same, each corner in a vector whose fourth number is 0.
-pub type Lanes = [f64x4; 3];
-
-/// The corners of a triangle in vectors.
-#[inline(always)]
-pub fn corners(lanes: &Lanes) -> Triangle {
-    lanes.map(|lane| {
-        let [x, y, z, _] = lane.to_array();
-        [x, y, z]
-    })
-}
-
-/// A box of voxels. Nothing outside is set.
-#[derive(Debug, Clone, Copy)]
-pub struct Clip {
-    lo: [i32; 3],
-    hi: [i32; 3],
-    /// The same with a fourth axis of one cell, which never clips.
-    low: f64x4,
-    high: f64x4,
-}
-
-impl Clip {
-    /// The voxels from `lo` to `hi`, both included.
-    pub fn new(lo: [i32; 3], hi: [i32; 3]) -> Self {
-        let lanes =
-            |c: [i32; 3], fourth: f64| f64x4::new([c[0].into(), c[1].into(), c[2].into(), fourth]);
-        Clip {
-            lo,
-            hi,
-            low: lanes(lo, -2.0),
-            high: lanes(hi, 2.0),
-        }
-    }
-
-    /// The first voxel.
-    pub fn lo(&self) -> [i32; 3] {
-        self.lo
-    }
-
-    /// The last voxel.
-    pub fn hi(&self) -> [i32; 3] {
-        self.hi
-    }
-
-    /// The lower sides of the first voxel and the upper sides of the last.
-    #[inline(always)]
-    pub fn sides(&self) -> [f64x4; 2] {
-        [self.low, self.high + f64x4::ONE]
-    }
-
-    /// All voxels of a grid.
-    pub fn grid(dims: [usize; 3]) -> Self {
-        Clip::new([0; 3], dims.map(|d| d as i32 - 1))
-    }
-}
-
-/// Beyond this many voxels a triangle's rounding errors are too large for solved runs to help.
-const LARGE: f64 = (1u64 << 36) as f64;
-
-fn pick(q: &Triangle, u: usize, v: usize) -> [[f64; 2]; 3] {
-    [[q[0][u], q[0][v]], [q[1][u], q[1][v]], [q[2][u], q[2][v]]]
-}
-
-/// The smaller number; unlike `f64::min` it need not care for NaN.
-#[inline(always)]
-pub fn min(a: f64, b: f64) -> f64 {
-    if a < b { a } else { b }
-}
-
-/// The larger number.
-#[inline(always)]
-pub fn max(a: f64, b: f64) -> f64 {
-    if a > b { a } else { b }
-}
-
-#[inline(always)]
-fn least(q: &Triangle, a: usize) -> f64 {
-    min(min(q[0][a], q[1][a]), q[2][a])
-}
-
-#[inline(always)]
-fn greatest(q: &Triangle, a: usize) -> f64 {
-    max(max(q[0][a], q[1][a]), q[2][a])
-}
-
-/// The triangle relative to a corner of the grid, its normal, and a bound on all coordinates of
-/// triangle and cells: what the span constraints are made from.
-struct Local {
-    q: Triangle,
-    n: Vec3,
-    reach: f64,
-}
-
-impl Local {
-    #[inline]
-    fn new(q: &Triangle, range: [(i32, i32); 3]) -> Self {
-        let base = range.map(|r| f64::from(r.0));
-        let local = q.map(|p| sub(p, base));
-        let mut reach = 0.0f64;
-        for p in &local {
-            reach = reach.max(p[0].abs()).max(p[1].abs()).max(p[2].abs());
-        }
-        for r in range {
-            reach = reach.max(f64::from(r.1 - r.0));
-        }
-        let n = cross(sub(local[1], local[0]), sub(local[2], local[0]));
-        Local {
-            q: local,
-            n,
-            reach: reach + 1.0,
-        }
-    }
-
-    /// The exact sign of a component of the normal.
-    #[inline]
-    fn sign(&self, q: &Triangle, axis: usize) -> i32 {
-        let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
-        side(self.n[axis], self.reach, pick(q, u, v))
-    }
-
-    #[inline]
-    fn edges(&self, (u, v): (usize, usize), side: i32, sample: Sample, width: i32) -> Edges {
-        Edges::new(pick(&self.q, u, v), side, sample, self.reach, (0, width))
-    }
-}
 
 /// How many cells a triangle's closed bounds meet, as far as it decides how its voxels are found.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -173,10 +37,11 @@ pub struct Place {
     pub small: Small,
 }
 
-/// Coordinates from the grid's, where rounded differently, are off by less than this many voxels.
-pub const NEAR: f64 = 1e-9;
 /// Up to this many corners inside of a triangle's bounds are cheaper to look at than rows are to solve.
 const FEW: usize = 36;
+
+/// The largest difference of the cells along an axis for [`Extent::Few`].
+const MOST_SPAN: f64 = (octants::EDGE - 1) as f64;
 
 impl Place {
     /// Where the triangle is. Within a grid of 2^16 voxels, `lanes` may be off by [`NEAR`].
@@ -193,8 +58,8 @@ impl Place {
             .abs()
             .fast_max((greatest - high - half).abs());
         let near = off.simd_gt(f64x4::splat(0.5 - NEAR));
-        let out = low.simd_gt(clip.high) | high.simd_lt(clip.low);
-        let clipped = near | low.simd_lt(clip.low) | high.simd_gt(clip.high);
+        let out = low.simd_gt(clip.upper()) | high.simd_lt(clip.lower());
+        let clipped = near | low.simd_lt(clip.lower()) | high.simd_gt(clip.upper());
         let spans = high - low;
         let above = |limit: f64x4| spans.simd_gt(limit).to_bitmask() & 7 != 0;
         let extent = if (clipped | out).to_bitmask() & 7 != 0 {
@@ -240,8 +105,9 @@ impl Place {
 
 /// The number of sizes that a triangle of at most [`Extent::Few`] can have.
 pub const SHAPES: usize = octants::EDGE * octants::EDGE * octants::EDGE;
-/// The largest difference of the cells along an axis for [`Extent::Few`].
-const MOST_SPAN: f64 = (octants::EDGE - 1) as f64;
+
+/// Beyond this many voxels a triangle's rounding errors are too large for solved runs to help.
+const LARGE: f64 = (1u64 << 36) as f64;
 
 /// Calls `emit(x0, x1, y, z)` for every run of voxels whose closed cubes the closed triangle meets.
 ///
@@ -289,7 +155,7 @@ pub fn overlap_exact(
     // The first and the last cell along each axis: those whose closed sides the bounds meet.
     let low = ceil4(lanes[0].fast_min(lanes[1]).fast_min(lanes[2])) - f64x4::ONE;
     let high = floor4(lanes[0].fast_max(lanes[1]).fast_max(lanes[2]));
-    if (low.simd_gt(clip.high) | high.simd_lt(clip.low)).to_bitmask() != 0 {
+    if (low.simd_gt(clip.upper()) | high.simd_lt(clip.lower())).to_bitmask() != 0 {
         return;
     }
     let whole = |c: f64x4| {
@@ -298,7 +164,7 @@ pub fn overlap_exact(
     };
     let (q, first, last) = (&corners(lanes), whole(low), whole(high));
     let range: [(i32, i32); 3] =
-        std::array::from_fn(|a| (first[a].max(clip.lo[a]), last[a].min(clip.hi[a])));
+        std::array::from_fn(|a| (first[a].max(clip.lo()[a]), last[a].min(clip.hi()[a])));
     let several = (0..3).fold(0, |bits, a| bits | usize::from(first[a] < last[a]) << a);
     let [x, y, z] = range;
     // A connected set inside a slab one cell thick meets a cell exactly where its projection does,
@@ -441,17 +307,6 @@ pub fn slices(
     }
 }
 
-/// The orientation of the projection onto `(u, v)`.
-#[inline]
-fn local_side(local: &Local, q: &Triangle, u: usize, v: usize) -> i32 {
-    // (x, z) is the mirror image of the cyclic (z, x).
-    if (u, v) == (0, 2) {
-        -local.sign(q, 1)
-    } else {
-        local.sign(q, 3 - u - v)
-    }
-}
-
 /// Emits the certain run, and of the rest what the exact test accepts.
 #[inline]
 fn settle_run(span: Span, exact: impl Fn(i32) -> bool, mut emit: impl FnMut(i32, i32)) {
@@ -541,203 +396,4 @@ pub fn touches(q: &Triangle, at: [i32; 3], edge: i32) -> bool {
     let far = std::array::from_fn(|a| if signs[a] > 0 { hi[a] } else { lo[a] });
     let near = std::array::from_fn(|a| if signs[a] > 0 { lo[a] } else { hi[a] });
     orient3d(q[0], q[1], q[2], far) >= 0 && orient3d(q[0], q[1], q[2], near) <= 0
-}
-
-/// Whether all three projections of the triangle have no area: its corners lie on one line.
-/// `reach` bounds all its coordinates.
-#[inline(always)]
-pub fn is_degenerate(q: &Triangle, reach: f64) -> bool {
-    let area = |u: usize, v: usize| {
-        let (e, f) = (
-            [q[1][u] - q[0][u], q[1][v] - q[0][v]],
-            [q[2][u] - q[0][u], q[2][v] - q[0][v]],
-        );
-        side(e[0] * f[1] - e[1] * f[0], reach, pick(q, u, v))
-    };
-    area(0, 1) == 0 && area(1, 2) == 0 && area(2, 0) == 0
-}
-
-/// Calls `emit(voxel)` for every voxel in which the triangle meets the line through the voxel
-/// centres along `axis`; edges and corners belong to the triangle.
-///
-/// A point on the face between two voxels belongs to the upper one, on the upper face of the grid
-/// (of `dims` voxels) to the last. A triangle seen edge on meets no line.
-#[inline]
-pub fn columns(
-    q: &Triangle,
-    axis: usize,
-    dims: [usize; 3],
-    clip: &Clip,
-    emit: &mut impl FnMut([i32; 3]),
-) {
-    let (u, v) = [(1, 2), (0, 2), (0, 1)][axis];
-    let centres = |a: usize| {
-        (
-            ceil(least(q, a) - 0.5).max(clip.lo[a]),
-            floor(greatest(q, a) - 0.5).min(clip.hi[a]),
-        )
-    };
-    let mut ranges = [(0, 0); 3];
-    (ranges[u], ranges[v]) = (centres(u), centres(v));
-    ranges[axis] = (floor(least(q, axis)), floor(greatest(q, axis)));
-    if ranges[u].0 > ranges[u].1 || ranges[v].0 > ranges[v].1 {
-        return;
-    }
-    let closed = |p: [[f64; 2]; 3], turn: i32, at: [f64; 2]| {
-        (0..3).all(|i| turn * orient2d(p[i], p[(i + 1) % 3], at) >= 0)
-    };
-    each_line(q, axis, ranges, closed, &mut |local, turn, cell| {
-        let point = |k: i32| on_line(axis, cell, f64::from(k));
-        // The plane is met at or above height k when the point there is not beyond it.
-        let reached = |k: i32| turn * orient3d(q[0], q[1], q[2], point(k)) <= 0;
-        let mut k = height(local, axis, cell, ranges, 0.0, ranges[axis], reached);
-        let last = dims[axis] as i32;
-        if k == last && orient3d(q[0], q[1], q[2], point(last)) == 0 {
-            k = last - 1;
-        }
-        if k >= clip.lo[axis] && k <= clip.hi[axis] {
-            let mut voxel = [0; 3];
-            (voxel[u], voxel[v], voxel[axis]) = (cell[0], cell[1], k);
-            emit(voxel);
-        }
-    });
-}
-
-/// Calls `emit(x, y, z, turn)` for every line through voxel centres along x that crosses the
-/// triangle: `x` is the first voxel whose centre is not before the crossing (it may lie outside of
-/// the grid), `turn` is 1 where the triangle faces +x and -1 where it faces -x.
-///
-/// Lines that meet an edge or a corner are decided as if moved by (e, e^2) along (y, z) for an
-/// infinitely small e, so of the triangles around it they cross as many as a line beside it.
-#[inline]
-pub fn crossings(q: &Triangle, clip: &Clip, emit: &mut impl FnMut(i32, i32, i32, i32)) {
-    let centres = |a: usize| {
-        (
-            ceil(least(q, a) - 0.5).max(clip.lo[a]),
-            (ceil(greatest(q, a) - 0.5) - 1).min(clip.hi[a]),
-        )
-    };
-    let within = (floor(least(q, 0)) - 1, ceil(greatest(q, 0)) + 1);
-    let ranges = [within, centres(1), centres(2)];
-    if ranges[1].0 > ranges[1].1 || ranges[2].0 > ranges[2].1 {
-        return;
-    }
-    let half_open = |p: [[f64; 2]; 3], turn: i32, at: [f64; 2]| {
-        (0..3).all(|i| turn * beside(p[i], p[(i + 1) % 3], at) > 0)
-    };
-    each_line(q, 0, ranges, half_open, &mut |local, turn, cell| {
-        let point = |k: i32| on_line(0, cell, f64::from(k) - 0.5);
-        // Centre k - 1 is before the crossing: the largest such k is the first not before it.
-        let before = |k: i32| turn * orient3d(q[0], q[1], q[2], point(k)) < 0;
-        emit(
-            height(local, 0, cell, ranges, 0.5, within, before),
-            cell[0],
-            cell[1],
-            turn,
-        );
-    });
-}
-
-/// The side of the line `a b` on which `p` lies when moved by (e, e^2); 0 only where `a` is `b`.
-#[inline]
-pub fn beside(a: [f64; 2], b: [f64; 2], p: [f64; 2]) -> i32 {
-    let turn = orient2d(a, b, p);
-    let compare = |x: f64, y: f64| i32::from(x > y) - i32::from(x < y);
-    if turn != 0 {
-        turn
-    } else if a[1] != b[1] {
-        compare(a[1], b[1])
-    } else {
-        compare(b[0], a[0])
-    }
-}
-
-/// The point at height `t` of the line along `axis` through the centres of `cell`.
-#[inline]
-fn on_line(axis: usize, cell: [i32; 2], t: f64) -> Vec3 {
-    let [u, v] = cell.map(|c| f64::from(c) + 0.5);
-    match axis {
-        0 => [t, u, v],
-        1 => [u, t, v],
-        _ => [u, v, t],
-    }
-}
-
-/// Calls `found(local, turn, cell)` for every line along `axis` through cell centres in `ranges`
-/// that the rule `inside` finds in the projected triangle; `turn` is the sign of the normal along
-/// the axis.
-#[inline]
-fn each_line(
-    q: &Triangle,
-    axis: usize,
-    ranges: [(i32, i32); 3],
-    inside: impl Fn([[f64; 2]; 3], i32, [f64; 2]) -> bool,
-    found: &mut impl FnMut(&Local, i32, [i32; 2]),
-) {
-    let (u, v) = [(1, 2), (0, 2), (0, 1)][axis];
-    let local = Local::new(q, ranges);
-    let turn = local.sign(q, axis);
-    if turn == 0 {
-        return;
-    }
-    let seen = local_side(&local, q, u, v);
-    let edges = local.edges((u, v), seen, Sample::Centre, ranges[u].1 - ranges[u].0);
-    for row in 0..=ranges[v].1 - ranges[v].0 {
-        let span = edges.row(row);
-        for i in span.possible.0..=span.possible.1 {
-            let cell = [ranges[u].0 + i, ranges[v].0 + row];
-            if span.is_certain(i) || inside(pick(q, u, v), seen, cell.map(|c| f64::from(c) + 0.5)) {
-                found(&local, turn, cell);
-            }
-        }
-    }
-}
-
-/// The largest `k` in `within` for which `reached(k)` holds, which it does up to the height at
-/// which the line of `cell` meets the plane, shifted up by `shift`; `reached` is asked only where
-/// rounding leaves it open.
-#[inline]
-fn height(
-    local: &Local,
-    axis: usize,
-    cell: [i32; 2],
-    ranges: [(i32, i32); 3],
-    shift: f64,
-    within: (i32, i32),
-    reached: impl Fn(i32) -> bool,
-) -> i32 {
-    let (u, v) = [(1, 2), (0, 2), (0, 1)][axis];
-    let at = [
-        f64::from(cell[0] - ranges[u].0) + 0.5,
-        f64::from(cell[1] - ranges[v].0) + 0.5,
-    ];
-    let [origin, ..] = local.q;
-    let slope = local.n[u] * (at[0] - origin[u]) + local.n[v] * (at[1] - origin[v]);
-    let t = origin[axis] - slope / local.n[axis] + shift + f64::from(ranges[axis].0);
-    // The error of the normal and of the numerator, over a normal that may itself be mostly error.
-    let reach = local.reach;
-    let margin = 512.0
-        * f64::EPSILON
-        * (reach * reach * reach / local.n[axis].abs() + reach + within.1.abs() as f64);
-    let margin = if margin.is_nan() {
-        f64::INFINITY
-    } else {
-        margin
-    };
-    let (mut low, mut high) = (
-        floor(t - margin).max(within.0),
-        floor(t + margin).min(within.1),
-    );
-    if t.is_nan() {
-        (low, high) = within;
-    }
-    while low < high {
-        let middle = low + (high - low + 1) / 2;
-        if reached(middle) {
-            low = middle;
-        } else {
-            high = middle - 1;
-        }
-    }
-    low
 }

@@ -1,0 +1,112 @@
+//! Where the commands that run another one put what they found.
+
+use crate::destination::{check_folder, refuse_overlap};
+use crate::shared::Wrapping;
+use crate::streams::print;
+use crate::table::Table;
+use crate::words;
+use scantle::error::{Error, Result};
+use scantle::image::plot::Plot;
+use scantle::io::sink::Sink;
+use scantle::report::{Input, Output, Report, SCHEMA};
+use serde::Serialize;
+
+/// Where a plot goes, and as what.
+struct Picture {
+    sink: Sink,
+    name: &'static str,
+}
+
+impl Picture {
+    fn new(word: &str) -> Result<Self> {
+        let sink = Sink::new(word);
+        let extension = sink.path().extension().map(|e| e.to_ascii_lowercase());
+        let name = ["svg", "png"].into_iter().find(|name| {
+            let wanted = extension.as_deref();
+            wanted.is_some_and(|extension| extension == *name)
+        });
+        let problem = "its name must end in .svg or .png";
+        let name = name.ok_or_else(|| Error::parameter("plot", word, problem))?;
+        Ok(Picture { sink, name })
+    }
+}
+
+/// Where results go.
+pub struct Places {
+    csv: Option<Sink>,
+    plot: Option<Picture>,
+    report: Sink,
+}
+
+impl Places {
+    /// Errs, before any work, where two results would go to one place or over an input, or a folder
+    /// is not there.
+    pub fn new(wrapping: &Wrapping, inputs: &[String]) -> Result<Self> {
+        let places = Places {
+            csv: wrapping.csv.as_deref().map(Sink::new),
+            plot: wrapping.plot.as_deref().map(Picture::new).transpose()?,
+            report: Sink::new(wrapping.report.report.as_deref().unwrap_or("-")),
+        };
+        let csv = places.csv.iter().map(|sink| ("csv", sink));
+        let plot = places.plot.iter().map(|plot| ("plot", &plot.sink));
+        let report = [("report", &places.report)];
+        let written: Vec<_> = plot.chain(csv).chain(report).collect();
+        refuse_overlap(inputs, &written)?;
+        written
+            .iter()
+            .try_for_each(|(_, sink)| check_folder(sink))?;
+        Ok(places)
+    }
+
+    /// Writes the plot and the table, where they are wanted.
+    pub fn write(
+        &self,
+        plot: impl FnOnce() -> Plot,
+        table: impl FnOnce() -> Table,
+    ) -> Result<Vec<Output>> {
+        let mut written = Vec::new();
+        if let Some(Picture { sink, name }) = &self.plot {
+            let drawn = match *name {
+                "svg" => plot().svg().into_bytes(),
+                _ => plot().png(),
+            };
+            written.push(sink.write_as(name, |out| out.write_all(&drawn))?);
+        }
+        if let Some(sink) = &self.csv {
+            let text = table().csv();
+            written.push(sink.write_as("csv", |out| out.write_all(&text))?);
+        }
+        Ok(written)
+    }
+
+    /// Writes the report.
+    pub fn deliver<P: Serialize, R: Serialize>(
+        &self,
+        command: &str,
+        parameters: P,
+        result: R,
+        input: Vec<Input>,
+        output: Vec<Output>,
+    ) -> Result<()> {
+        let report = Report {
+            schema: SCHEMA,
+            scantle: env!("CARGO_PKG_VERSION").to_owned(),
+            command: command.to_owned(),
+            input,
+            output,
+            parameters,
+            result,
+            accuracy: None,
+            modelled: None,
+            warnings: Vec::new(),
+            run: None,
+        };
+        let document = words::json(&report, true);
+        match &self.report {
+            Sink::Stdout => print(&document),
+            sink => sink
+                .write_as("json", |out| out.write_all(&document))
+                .map(|_| ()),
+        }
+    }
+}

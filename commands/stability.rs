@@ -1,0 +1,339 @@
+//! `scantle stability`: how far results drift at the extremes.
+
+mod result;
+
+use crate::exit::Exit;
+use crate::machine::{self, Moment};
+use crate::places::Places;
+use crate::progress::{self, Recorder};
+use crate::runs::{self, Document, Runs};
+use crate::shared::{Seed, Wrapping, not_negative, positive};
+use crate::streams::{say, show};
+use crate::wrapped::Wrapped;
+use result::{Asked, Outcome, Row, Stats};
+use scantle::error::Result;
+use scantle::io::format::Format;
+use scantle::io::sink::Sink;
+use scantle::io::source::Source;
+use scantle::io::{self, Content};
+use scantle::measure::stability::{Changed, Drift, Motion, Step, mesh_drift, steps, volume_drift};
+use scantle::measure::tradeoff::Failed;
+use scantle::mesh::Mesh;
+use scantle::progress::Progress;
+use std::path::PathBuf;
+use tempfile::TempDir;
+
+/// Measure how far a command's result drifts when its input is taken to the extremes
+///
+/// Scales the input by powers of two, moves it far away, turns it, reorders, splits and doubles its
+/// elements, adds triangles without area, and shakes the last bit of every coordinate; runs the
+/// command on each, undoes the change on the result, and measures how far that is from the result
+/// of the untouched input.
+///
+/// Where a change has to round coordinates, the result is compared with that of the input so
+/// rounded, and what the rounding of the input itself does is a figure of its own. Changes under
+/// which the result is promised to stay the same count for --max-error; the others are shown.
+#[derive(Debug, clap::Args)]
+#[command(after_long_help = AFTER, override_usage = USAGE)]
+pub struct Args {
+    #[command(flatten)]
+    wrapping: Wrapping,
+    /// Exit with 1 when the drift under a change that counts is larger than X, in the unit of the
+    /// input; 0 lets nothing change at all
+    #[arg(long, value_name = "X", value_parser = not_negative)]
+    max_error: Option<f64>,
+    /// Powers of two to scale by, as exponents from -1000 to 1000
+    #[arg(long, value_name = "K,...", value_parser = exponents, default_value = "-100,-50,-20,-5,-1,1,5,20,50,100", allow_hyphen_values = true)]
+    scales: Exponents,
+    /// How far to move, in extents of the input; each becomes the nearest power of two
+    #[arg(long, value_name = "N,...", value_parser = offsets, default_value = "1,1e3,1e6,1e9")]
+    offsets: Offsets,
+    #[command(flatten)]
+    seed: Seed,
+}
+
+/// Exponents of two, as one value of the command line.
+#[derive(Debug, Clone)]
+pub struct Exponents(pub Vec<i32>);
+
+/// Offsets in extents, as one value of the command line.
+#[derive(Debug, Clone)]
+pub struct Offsets(pub Vec<f64>);
+
+fn exponents(text: &str) -> Result<Exponents, String> {
+    let all: Result<Vec<i32>, _> = text.split(',').map(|word| word.trim().parse()).collect();
+    match all {
+        Ok(all) if all.iter().all(|k| (-1000..=1000).contains(k)) => Ok(Exponents(all)),
+        Ok(_) => Err("must be from -1000 to 1000".to_owned()),
+        Err(_) => Err("has something that is no whole number".to_owned()),
+    }
+}
+
+fn offsets(text: &str) -> Result<Offsets, String> {
+    let all: Result<Vec<f64>, String> = text.split(',').map(|n| positive(n.trim())).collect();
+    all.map(Offsets)
+}
+
+const USAGE: &str = "scantle stability COMMAND INPUT [OPTIONS]";
+
+const AFTER: &str = "\
+Options of the command that are lengths or points are moved with the input.
+
+Examples:
+  scantle stability voxelize fixtures/shapes/torus-knot.ply --resolution 24 --max-error 0
+  scantle stability voxelize fixtures/shapes/sphere.stl --resolution 16 --offsets 1,1e12
+";
+
+/// The report of this command.
+pub type Report = scantle::report::Report<Asked, Stats>;
+
+/// Takes the input to the extremes.
+pub fn run(args: &Args) -> Result<Exit> {
+    let wrapped = match Wrapped::new(&args.wrapping.command, &args.wrapping.words) {
+        Ok(wrapped) => wrapped,
+        Err(why) => return Ok(runs::refuse("stability", &why)),
+    };
+    let [name] = &wrapped.inputs[..] else {
+        let why = format!("{} inputs, where one is taken", wrapped.inputs.len());
+        return Ok(runs::refuse("stability", &why));
+    };
+    let places = Places::new(&args.wrapping, &wrapped.inputs)?;
+    let source = Source::open(name, machine::default_memory())?;
+    let format = wrapped.value("input-format");
+    let (mesh, input, _) = io::read_mesh(&source, format.as_deref().and_then(Format::from_name))?;
+    drop(source);
+    let bench = Bench::new(args, &wrapped, &mesh)?;
+    let untouched = match bench.run(&mesh, &Motion::NONE, "untouched") {
+        Ok(untouched) => untouched,
+        Err(failed) => {
+            say(format_args!(
+                "stability: the untouched input fails: {}",
+                failed.message
+            ));
+            return Ok(Exit::of_code(failed.code));
+        }
+    };
+    let talk = &args.wrapping.talk;
+    let with_bar = !talk.quiet && !talk.verbose && progress::is_watched();
+    let mut recorder = Recorder::new(Moment::now(), with_bar);
+    let all = steps(&args.scales.0, &args.offsets.0);
+    recorder.stage("run", all.len() as u64);
+    let mut rows = Vec::with_capacity(all.len());
+    for step in all {
+        rows.push(bench.row(step, &untouched));
+        recorder.advance(1);
+    }
+    recorder.finish();
+    let stats = Stats::new(&mesh, untouched.bound, rows);
+    let table = result::table(&stats);
+    if !talk.quiet {
+        show(&table.aligned());
+        show(&result::summary(&stats));
+    }
+    let exit = judge(&stats, args.max_error);
+    let output = places.write(|| result::plot(&stats), || result::exported(&stats))?;
+    let asked = Asked::new(&wrapped, args);
+    places.deliver("stability", asked, stats, vec![input], output)?;
+    Ok(exit)
+}
+
+/// The check, where it was asked for.
+fn judge(stats: &Stats, most: Option<f64>) -> Exit {
+    let Some(most) = most else {
+        return Exit::Done;
+    };
+    let broken: Vec<&Row> = stats.broken(most);
+    if broken.is_empty() {
+        return Exit::Done;
+    }
+    let names: Vec<String> = broken.iter().map(|row| row.name()).collect();
+    say(format_args!(
+        "stability: check failed: the drift is larger than --max-error {most} under {}",
+        names.join(", ")
+    ));
+    Exit::CheckFailed
+}
+
+/// A result, read back.
+struct Made {
+    content: Content,
+    bound: Option<f64>,
+}
+
+/// Where changed inputs are run.
+struct Bench<'a> {
+    wrapped: &'a Wrapped,
+    mesh: &'a Mesh,
+    seed: u64,
+    runs: Runs,
+    format: Format,
+    folder: TempDir,
+}
+
+impl<'a> Bench<'a> {
+    fn new(args: &Args, wrapped: &'a Wrapped, mesh: &'a Mesh) -> Result<Self> {
+        let folder = tempfile::tempdir().map_err(|source| scantle::error::Error::Write {
+            path: std::env::temp_dir(),
+            source,
+        })?;
+        Ok(Bench {
+            wrapped,
+            mesh,
+            seed: args.seed.seed,
+            runs: Runs {
+                in_process: args.wrapping.in_process,
+                verbose: args.wrapping.talk.verbose,
+            },
+            format: Format::from_name(wrapped.trade.result).unwrap_or(Format::Ply),
+            folder,
+        })
+    }
+
+    fn path(&self, name: &str, format: Format) -> PathBuf {
+        self.folder.path().join(format!("{name}.{}", format.name()))
+    }
+
+    /// The options that are places, moved.
+    fn options(
+        &self,
+        motion: &Motion,
+        undo: bool,
+    ) -> Result<Vec<(String, Option<String>)>, String> {
+        let moved = |numbers: &[f64], is_length: bool| -> Result<Vec<f64>, String> {
+            let there: Vec<f64> = if is_length {
+                numbers.iter().map(|n| motion.length(*n)).collect()
+            } else {
+                motion.place(numbers)?
+            };
+            if !undo {
+                return Ok(there);
+            }
+            // As the moved options are, but at their old place.
+            Ok(if is_length {
+                there
+                    .iter()
+                    .map(|n| n * 2f64.powi(-motion.exponent))
+                    .collect()
+            } else {
+                let back = there.chunks(3).map(|p| motion.undo([p[0], p[1], p[2]]));
+                back.flatten().collect()
+            })
+        };
+        let trade = self.wrapped.trade;
+        let lengths = trade.lengths.iter().map(|name| (*name, true));
+        let mut options = Vec::new();
+        for (name, is_length) in lengths.chain(trade.points.iter().map(|name| (*name, false))) {
+            let Some(value) = self.wrapped.value(name) else {
+                continue;
+            };
+            let numbers: Result<Vec<f64>, _> = value.split(',').map(|n| n.trim().parse()).collect();
+            let numbers =
+                numbers.map_err(|_| format!("--{name} {value} has something that is no number"))?;
+            let there = moved(&numbers, is_length).map_err(|why| format!("--{name}: {why}"))?;
+            let there: Vec<String> = there.iter().map(|n| format!("{n:?}")).collect();
+            options.push((name.to_owned(), Some(there.join(","))));
+        }
+        Ok(options)
+    }
+
+    /// Runs the command on a mesh, with its places moved.
+    fn run(&self, mesh: &Mesh, motion: &Motion, name: &str) -> Result<Made, Failed> {
+        let options = self.options(motion, false).map_err(unfit)?;
+        self.run_with(mesh, &options, name)
+    }
+
+    fn run_with(
+        &self,
+        mesh: &Mesh,
+        options: &[(String, Option<String>)],
+        name: &str,
+    ) -> Result<Made, Failed> {
+        let broken = |error: scantle::error::Error| Failed {
+            code: Exit::of(&error) as u8,
+            message: error.to_string(),
+        };
+        let (from, to) = (
+            self.path(name, Format::Ply),
+            self.path(&format!("{name}-made"), self.format),
+        );
+        io::write_mesh(mesh, &Sink::File(from.clone()), Format::Ply).map_err(broken)?;
+        let (input, output) = (from.display().to_string(), to.display().to_string());
+        let mut options = options.to_vec();
+        if self.wrapped.is_set("input-format") {
+            options.push((
+                "input-format".to_owned(),
+                Some(Format::Ply.name().to_owned()),
+            ));
+        }
+        let words = self.wrapped.words(std::slice::from_ref(&input), &options);
+        let documents = self.runs.run(&words, &["--output", &output]);
+        let documents: Vec<Document> = documents.map_err(|failed| Failed {
+            message: failed.message.replace(&input, &self.wrapped.inputs[0]),
+            ..failed
+        })?;
+        let source = Source::open(&output, machine::default_memory()).map_err(broken)?;
+        let (content, ..) = io::read(&source, Some(self.format)).map_err(broken)?;
+        let error = documents.first().and_then(|d| d.error(self.wrapped.trade));
+        Ok(Made {
+            content,
+            bound: error.and_then(|error| error.bound),
+        })
+    }
+
+    /// Takes one step, and measures.
+    fn row(&self, step: Step, untouched: &Made) -> Row {
+        let wrapped = self.wrapped;
+        let promised = wrapped
+            .trade
+            .is_invariant(step.change(), |option| wrapped.value(option));
+        let mut row = Row::new(step, promised);
+        let changed = match step.apply(self.mesh, self.seed) {
+            Ok(changed) => changed,
+            Err(why) => return row.skipped(why),
+        };
+        row.rounding(changed.rounding);
+        match self.drifts(&changed, untouched) {
+            Ok((drift, by_input)) => row.done(drift, by_input),
+            Err(failed) => row.failed(failed),
+        }
+    }
+
+    /// The drift of the command, and that which the rounding of its input makes.
+    fn drifts(
+        &self,
+        changed: &Changed,
+        untouched: &Made,
+    ) -> Result<(Drift, Option<Drift>), Failed> {
+        let motion = &changed.motion;
+        let made = self.run(&changed.mesh, motion, "changed")?;
+        let given = self.options(&Motion::NONE, false).map_err(unfit)?;
+        let options = self.options(motion, true).map_err(unfit)?;
+        if changed.rounded.is_none() && given == options || motion.turn != Motion::NONE.turn {
+            return Ok((drift(untouched, &made, motion)?, None));
+        }
+        let mesh = changed.rounded.as_ref().unwrap_or(self.mesh);
+        let reference = self.run_with(mesh, &options, "rounded")?;
+        let by_input = drift(untouched, &reference, &Motion::NONE)?;
+        Ok((drift(&reference, &made, motion)?, Some(by_input)))
+    }
+}
+
+fn unfit(message: String) -> Failed {
+    Failed {
+        code: Outcome::SKIPPED,
+        message,
+    }
+}
+
+fn drift(reference: &Made, made: &Made, motion: &Motion) -> Result<Drift, Failed> {
+    match (&reference.content, &made.content) {
+        (Content::Volume(a), Content::Volume(b)) => Ok(volume_drift(a, b, motion)),
+        (Content::Mesh(a), Content::Mesh(b)) => mesh_drift(a, b, motion).map_err(|error| Failed {
+            code: Exit::of(&error) as u8,
+            message: error.to_string(),
+        }),
+        _ => Err(unfit(
+            "the results are not of one kind that drift is measured for".to_owned(),
+        )),
+    }
+}

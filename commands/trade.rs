@@ -1,0 +1,108 @@
+//! Which commands trade accuracy for time, and why the others do not.
+
+use scantle::trade::Trade;
+use scantle::volume::voxelize;
+
+/// What a command says about its trade.
+pub enum Declared {
+    /// It has one.
+    Trade(&'static Trade),
+    /// It has none, for this reason.
+    None(&'static str),
+}
+
+/// Every command; `tradeoff` and `stability` know no other way to one.
+pub const TABLE: &[(&str, Declared)] = &[
+    ("voxelize", Declared::Trade(&voxelize::TRADE)),
+    (
+        "compare",
+        Declared::None(
+            "what it reports is the error of another result, with a bound that says how well it is known",
+        ),
+    ),
+    (
+        "convert",
+        Declared::None("it keeps every number, or says what the format cannot hold"),
+    ),
+    ("info", Declared::None("it counts, exactly")),
+    ("tradeoff", Declared::None("it measures that of others")),
+    (
+        "stability",
+        Declared::None("it measures the drift of others"),
+    ),
+    ("formats", Declared::None("it reads no data")),
+    ("schema", Declared::None("it reads no data")),
+    ("completions", Declared::None("it reads no data")),
+    ("man", Declared::None("it reads no data")),
+    ("help", Declared::None("it reads no data")),
+];
+
+/// The trade of a command; else why there is none.
+pub fn of(command: &str) -> Result<&'static Trade, String> {
+    match TABLE.iter().find(|(name, _)| *name == command) {
+        Some((_, Declared::Trade(trade))) => Ok(trade),
+        Some((_, Declared::None(reason))) => Err(format!("{command} has no trade: {reason}")),
+        None => {
+            let names: Vec<_> = TABLE
+                .iter()
+                .filter(|(_, declared)| matches!(declared, Declared::Trade(_)))
+                .map(|(name, _)| *name)
+                .collect();
+            let names = names.join(", ");
+            Err(format!(
+                "there is no command {command}; those with a trade: {names}"
+            ))
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::cli;
+    use scantle::io::format::Format;
+
+    #[test]
+    fn every_command_has_one_row() {
+        let mut command = cli::command();
+        command.build();
+        let mut there: Vec<_> = command.get_subcommands().map(|c| c.get_name()).collect();
+        let mut rows: Vec<_> = TABLE.iter().map(|(name, _)| *name).collect();
+        there.sort_unstable();
+        rows.sort_unstable();
+        assert_eq!(there, rows);
+    }
+
+    #[test]
+    fn every_knob_is_an_option_and_takes_its_ladder() {
+        for (name, declared) in TABLE {
+            let Declared::Trade(trade) = declared else {
+                continue;
+            };
+            assert!(!trade.knobs.is_empty(), "{name}");
+            for knob in trade.knobs {
+                assert!(knob.ladder.len() > 1, "{name} --{}", knob.name);
+                for value in knob.ladder {
+                    let words = [*name, "a.ply", &format!("--{}", knob.name), value];
+                    let parsed = cli::parse_words(&words.map(str::to_owned));
+                    assert!(parsed.is_ok(), "{name} --{} {value}", knob.name);
+                }
+            }
+            let definition = cli::command();
+            let definition = definition.find_subcommand(name).expect("a command");
+            let has = |long: &str| {
+                definition
+                    .get_arguments()
+                    .any(|a| a.get_long() == Some(long))
+            };
+            let placed = trade.lengths.iter().chain(trade.points);
+            let needed = ["verify", "timings", "report", "quiet", "output"];
+            assert!(placed.chain(&needed).all(|long| has(long)), "{name}");
+            let format = Format::from_name(trade.result).expect("a format");
+            assert!(format.is_read() && format.is_written(), "{name}");
+            for row in trade.invariant {
+                assert!(row.only.iter().all(|(option, _)| has(option)), "{name}");
+            }
+        }
+    }
+}

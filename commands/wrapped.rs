@@ -1,0 +1,188 @@
+//! A command that another one runs: its words taken apart and put together again.
+
+use crate::cli;
+use crate::trade;
+use clap::parser::ValueSource;
+use clap::{Arg, ArgMatches};
+use scantle::trade::Trade;
+
+/// A command with its inputs and options.
+#[derive(Debug)]
+pub struct Wrapped {
+    /// Its name.
+    pub name: String,
+    /// Its trade.
+    pub trade: &'static Trade,
+    /// What it reads.
+    pub inputs: Vec<String>,
+    definition: clap::Command,
+    matches: ArgMatches,
+}
+
+/// Options that the wrapping command sets itself.
+const TAKEN: &[&str] = &["output", "preview", "timings", "verify"];
+
+impl Wrapped {
+    /// Takes the words of a command apart. Errs with what to say to the user.
+    pub fn new(name: &str, words: &[String]) -> Result<Self, String> {
+        let trade = trade::of(name)?;
+        let all = cli::command();
+        let full = ["scantle", name].into_iter();
+        let matches = all
+            .clone()
+            .try_get_matches_from(full.chain(words.iter().map(String::as_str)))
+            .map_err(|error| cli::message(&error))?;
+        let (Some(definition), Some((_, matches))) =
+            (all.find_subcommand(name), matches.subcommand())
+        else {
+            return Err(format!("there is no command {name}"));
+        };
+        let mut wrapped = Wrapped {
+            name: name.to_owned(),
+            trade,
+            inputs: Vec::new(),
+            definition: definition.clone(),
+            matches: matches.clone(),
+        };
+        wrapped.inputs = wrapped.positionals();
+        if let Some(taken) = TAKEN.iter().find(|option| wrapped.is_set(option)) {
+            return Err(format!(
+                "--{taken} is set for {name} here, and cannot be given"
+            ));
+        }
+        if wrapped.inputs.iter().any(|input| input == "-") {
+            return Err(format!(
+                "standard input can be read only once, and {name} is run many times: name a file"
+            ));
+        }
+        Ok(wrapped)
+    }
+
+    fn positionals(&self) -> Vec<String> {
+        let positionals = self
+            .definition
+            .get_arguments()
+            .filter(|a| a.is_positional());
+        positionals.flat_map(|arg| self.raw(arg)).collect()
+    }
+
+    /// The values of an argument, defaults included.
+    fn raw(&self, arg: &Arg) -> Vec<String> {
+        let values = self.matches.get_raw(arg.get_id().as_str());
+        values
+            .map(|values| values.map(|v| v.to_string_lossy().into_owned()).collect())
+            .unwrap_or_default()
+    }
+
+    fn arg(&self, option: &str) -> Option<&Arg> {
+        let mut options = self.definition.get_arguments();
+        options.find(|arg| arg.get_long() == Some(option))
+    }
+
+    /// Whether the user gave an option.
+    pub fn is_set(&self, option: &str) -> bool {
+        self.arg(option).is_some_and(|arg| {
+            self.matches.value_source(arg.get_id().as_str()) == Some(ValueSource::CommandLine)
+        })
+    }
+
+    /// The value of an option, as given or by default.
+    pub fn value(&self, option: &str) -> Option<String> {
+        self.raw(self.arg(option)?).into_iter().next()
+    }
+
+    /// The options that the user gave, each with its value where it takes one.
+    pub fn options(&self) -> Vec<(String, Option<String>)> {
+        let mut found = Vec::new();
+        for arg in self.definition.get_arguments() {
+            let Some(long) = arg.get_long().filter(|long| self.is_set(long)) else {
+                continue;
+            };
+            if arg.get_action().takes_values() {
+                let values = self.raw(arg).into_iter();
+                found.extend(values.map(|value| (long.to_owned(), Some(value))));
+            } else {
+                found.push((long.to_owned(), None));
+            }
+        }
+        found
+    }
+
+    /// The words of a run, from the command's name on: over `inputs`, with the user's options and
+    /// `more`, which replace those of the same name.
+    pub fn words(&self, inputs: &[String], more: &[(String, Option<String>)]) -> Vec<String> {
+        let is_replaced = |name: &String| more.iter().any(|(other, _)| other == name);
+        let kept = self.options().into_iter();
+        let options = kept
+            .filter(|(name, _)| !is_replaced(name))
+            .chain(more.iter().cloned())
+            .flat_map(|(name, value)| match value {
+                // A value that begins with a dash would be taken for an option.
+                Some(value) if value.starts_with('-') => vec![format!("--{name}={value}")],
+                Some(value) => vec![format!("--{name}"), value],
+                None => vec![format!("--{name}")],
+            });
+        let name = std::iter::once(self.name.clone());
+        let inputs = inputs.iter().cloned();
+        if inputs.clone().any(|input| input.starts_with('-')) {
+            let dashes = std::iter::once("--".to_owned());
+            name.chain(options).chain(dashes).chain(inputs).collect()
+        } else {
+            name.chain(inputs).chain(options).collect()
+        }
+    }
+
+    /// Errs with what clap says about the words of a run.
+    pub fn check(words: &[String]) -> Result<(), String> {
+        let parsed = cli::parse_words(words);
+        parsed.map(|_| ()).map_err(|error| cli::message(&error))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn wrapped(line: &str) -> Result<Wrapped, String> {
+        let words: Vec<String> = line.split_whitespace().map(str::to_owned).collect();
+        Wrapped::new(&words[0], &words[1..])
+    }
+
+    #[test]
+    fn words_come_back_in_order_with_what_is_changed() {
+        let w = wrapped("voxelize --bounds=-1,0,0,1,1,1 a.ply --fill winding b.ply --threads 2")
+            .expect("words");
+        assert_eq!(w.inputs, ["a.ply", "b.ply"]);
+        assert_eq!(w.value("mode").as_deref(), Some("conservative"));
+        assert!(!w.is_set("mode") && w.is_set("bounds"));
+        let more = [("fill".to_owned(), Some("none".to_owned()))];
+        let inputs = ["c.ply".to_owned()];
+        assert_eq!(
+            w.words(&inputs, &more).join(" "),
+            "voxelize c.ply --bounds=-1,0,0,1,1,1 --threads 2 --fill none"
+        );
+        let dashed = ["-c.ply".to_owned()];
+        let words = w.words(&dashed, &more);
+        assert_eq!(words[words.len() - 2..], ["--", "-c.ply"]);
+        assert!(Wrapped::check(&words).is_ok());
+    }
+
+    #[test]
+    fn what_cannot_be_wrapped_is_refused_with_words() {
+        let why = |line| wrapped(line).expect_err("a refusal");
+        assert_eq!(
+            why("nonsense a"),
+            "there is no command nonsense; those with a trade: voxelize"
+        );
+        assert_eq!(why("info a"), "info has no trade: it counts, exactly");
+        assert_eq!(
+            why("voxelize a.ply -o b.svo"),
+            "--output is set for voxelize here, and cannot be given"
+        );
+        assert_eq!(
+            why("voxelize -"),
+            "standard input can be read only once, and voxelize is run many times: name a file"
+        );
+        assert!(why("voxelize a.ply --mode x").starts_with("invalid value 'x' for '--mode"));
+    }
+}

@@ -1,0 +1,262 @@
+//! The steps: what is done to a mesh, and what of it is rounding.
+
+use super::motion::Motion;
+use crate::mesh::Mesh;
+use crate::numeric::rng::Rng;
+use crate::numeric::vector::{Vec3, length, sub};
+use schemars::JsonSchema;
+use serde::Serialize;
+
+/// A change of some size.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Step {
+    /// Scaled by two to this power.
+    Scale(i32),
+    /// Moved by about so many extents along x, half as far back along y, a quarter along z.
+    Shift(f64),
+    /// Turned by 90 degrees about this axis of the coordinates.
+    QuarterTurn(usize),
+    /// Turned by one radian about (1, 2, 3).
+    Turn,
+    /// Vertices in another order.
+    VertexOrder,
+    /// Elements in another order.
+    FaceOrder,
+    /// Vertices of their own for every element.
+    SplitVertices,
+    /// Every element twice.
+    DuplicateFaces,
+    /// Triangles without area added at vertices in use.
+    DegenerateFaces,
+    /// Every coordinate one bit up, down, or as it is.
+    Jitter,
+}
+
+/// A mesh after a step.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Changed {
+    /// The mesh.
+    pub mesh: Mesh,
+    /// How it was moved, if it was.
+    pub motion: Motion,
+    /// Where coordinates were rounded: the mesh at its old place that `mesh` is, moved exactly.
+    pub rounded: Option<Mesh>,
+    /// How far that moved vertices.
+    pub rounding: Rounding,
+}
+
+/// How far vertices were moved that should have stayed.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, JsonSchema)]
+pub struct Rounding {
+    /// The largest distance, in the mesh's unit.
+    pub max: f64,
+    /// The same over the longest side of the mesh's box.
+    pub relative: f64,
+    /// The most that a coordinate changed, in units of the last place of the mesh's largest.
+    pub ulps: f64,
+}
+
+impl Rounding {
+    fn between(from: &Mesh, to: &[Vec3]) -> Self {
+        let mut found = Rounding::default();
+        let all = from.positions.as_flattened().iter();
+        let largest = all.fold(0.0f64, |most, c| most.max(c.abs()));
+        let ulp = largest.next_up() - largest;
+        for (a, b) in from.positions.iter().zip(to) {
+            let moved = sub(*b, *a);
+            found.max = found.max.max(length(moved));
+            let most = moved.iter().fold(0.0f64, |most, c| most.max(c.abs()));
+            found.ulps = found.ulps.max(most / ulp);
+        }
+        found.relative = found.max / extent(from);
+        found
+    }
+}
+
+/// The longest side of a mesh's box; 1 where it has none.
+pub fn extent(mesh: &Mesh) -> f64 {
+    let sides = mesh.bounds().extent();
+    let longest = sides[0].max(sides[1]).max(sides[2]);
+    if longest > 0.0 { longest } else { 1.0 }
+}
+
+/// Triangles without area that are added.
+const DEGENERATE: u64 = 64;
+
+impl Step {
+    /// Changes a mesh; `seed` draws orders and bits. Errs, with the reason, where the step cannot be
+    /// taken. Faces of more corners than three become the triangles they were split into where
+    /// elements change. Cost: a copy of the mesh.
+    pub fn apply(self, mesh: &Mesh, seed: u64) -> Result<Changed, String> {
+        match self {
+            Step::Scale(exponent) => moved(mesh, Motion::scale(exponent), true),
+            Step::Shift(extents) => {
+                // A power of two has one bit, so adding it keeps as many bits as can be kept.
+                let about = (extents * extent(mesh)).log2().round();
+                let far = about.exp2();
+                moved(mesh, Motion::shift([far, -0.5 * far, 0.25 * far]), true)
+            }
+            Step::QuarterTurn(axis) => moved(mesh, Motion::quarter_turn(axis), true),
+            Step::Turn => moved(mesh, Motion::turn([1.0, 2.0, 3.0], 1.0), false),
+            Step::Jitter => {
+                let mut changed = mesh.clone();
+                for (v, p) in changed.positions.iter_mut().enumerate() {
+                    let mut rng = Rng::new(seed, v as u64);
+                    *p = p.map(|c| [c.next_down(), c, c.next_up()][rng.below(3)]);
+                }
+                let rounding = Rounding::between(mesh, &changed.positions);
+                finite(Changed {
+                    mesh: changed,
+                    motion: Motion::NONE,
+                    rounded: None,
+                    rounding,
+                })
+            }
+            _ => Ok(Changed {
+                mesh: self.rearranged(mesh, seed)?,
+                motion: Motion::NONE,
+                rounded: None,
+                rounding: Rounding::default(),
+            }),
+        }
+    }
+
+    fn rearranged(self, mesh: &Mesh, seed: u64) -> Result<Mesh, String> {
+        let mut changed = Mesh {
+            polygons: None,
+            ..mesh.clone()
+        };
+        match self {
+            Step::VertexOrder => permute_vertices(&mut changed, seed),
+            Step::FaceOrder => {
+                shuffle(&mut changed.triangles, seed);
+                shuffle(&mut changed.segments, seed);
+                shuffle(&mut changed.points, seed);
+            }
+            Step::SplitVertices => changed = split(mesh),
+            Step::DuplicateFaces => {
+                changed.triangles.extend_from_within(..);
+                changed.segments.extend_from_within(..);
+                changed.points.extend_from_within(..);
+            }
+            Step::DegenerateFaces => {
+                if mesh.triangles.is_empty() {
+                    return Err("there is no triangle to add others at".to_owned());
+                }
+                for i in 0..DEGENERATE {
+                    let mut rng = Rng::new(seed, i);
+                    let [a, b, _] = mesh.triangles[rng.below(mesh.triangles.len())];
+                    let flat = if i % 2 == 0 { [a, a, a] } else { [a, b, b] };
+                    changed.triangles.push(flat);
+                }
+            }
+            _ => {}
+        }
+        Ok(changed)
+    }
+}
+
+/// A mesh moved. `exactly` says that the motion, undone, gives back what was really moved.
+fn moved(mesh: &Mesh, motion: Motion, exactly: bool) -> Result<Changed, String> {
+    let mut changed = mesh.clone();
+    let positions = &mut changed.positions;
+    positions.iter_mut().for_each(|p| *p = motion.apply(*p));
+    if let Some(normals) = &mut changed.normals {
+        normals.iter_mut().for_each(|n| *n = motion.turned(*n));
+    }
+    let back: Vec<Vec3> = changed.positions.iter().map(|p| motion.undo(*p)).collect();
+    let rounding = Rounding::between(mesh, &back);
+    let is_rounded = back != mesh.positions;
+    // Only what moves to the same place again stands for the moved mesh.
+    let stands = exactly
+        && back
+            .iter()
+            .zip(&changed.positions)
+            .all(|(b, p)| motion.apply(*b) == *p);
+    let rounded = (is_rounded && stands).then(|| Mesh {
+        positions: back,
+        ..mesh.clone()
+    });
+    finite(Changed {
+        mesh: changed,
+        motion,
+        rounded,
+        rounding,
+    })
+}
+
+fn finite(changed: Changed) -> Result<Changed, String> {
+    let all = changed.mesh.positions.as_flattened();
+    if all.iter().all(|c| c.is_finite()) {
+        Ok(changed)
+    } else {
+        Err("coordinates overflow".to_owned())
+    }
+}
+
+/// Fisher and Yates (1938), each exchange drawn from the seed and its place.
+fn shuffle<T>(items: &mut [T], seed: u64) {
+    for last in (1..items.len()).rev() {
+        items.swap(last, Rng::new(seed, last as u64).below(last + 1));
+    }
+}
+
+fn permute_vertices(mesh: &mut Mesh, seed: u64) {
+    let mut order: Vec<usize> = (0..mesh.positions.len()).collect();
+    shuffle(&mut order, seed);
+    let mut place = vec![0u32; order.len()];
+    for (new, old) in order.iter().enumerate() {
+        place[*old] = new as u32;
+    }
+    take(mesh, &order);
+    let to_new = |v: &mut u32| *v = place[*v as usize];
+    mesh.triangles
+        .as_flattened_mut()
+        .iter_mut()
+        .for_each(to_new);
+    mesh.segments.as_flattened_mut().iter_mut().for_each(to_new);
+    mesh.points.iter_mut().for_each(to_new);
+}
+
+/// Makes the vertices those of these old indices.
+fn take(mesh: &mut Mesh, order: &[usize]) {
+    mesh.positions = order.iter().map(|v| mesh.positions[*v]).collect();
+    if let Some(normals) = &mut mesh.normals {
+        *normals = order.iter().map(|v| normals[*v]).collect();
+    }
+    if let Some(colors) = &mut mesh.colors {
+        *colors = order.iter().map(|v| colors[*v]).collect();
+    }
+}
+
+/// The same elements, none of which shares a vertex. Vertices that no element uses are kept first.
+fn split(mesh: &Mesh) -> Mesh {
+    let mut changed = Mesh {
+        polygons: None,
+        ..mesh.clone()
+    };
+    let mut used = vec![false; mesh.positions.len()];
+    let elements = mesh.triangles.as_flattened().iter();
+    let elements = elements
+        .chain(mesh.segments.as_flattened())
+        .chain(&mesh.points);
+    elements.for_each(|v| used[*v as usize] = true);
+    let mut order: Vec<usize> = (0..used.len()).filter(|v| !used[*v]).collect();
+    let mut own = |v: &mut u32| {
+        order.push(*v as usize);
+        *v = order.len() as u32 - 1;
+    };
+    changed
+        .triangles
+        .as_flattened_mut()
+        .iter_mut()
+        .for_each(&mut own);
+    changed
+        .segments
+        .as_flattened_mut()
+        .iter_mut()
+        .for_each(&mut own);
+    changed.points.iter_mut().for_each(&mut own);
+    take(&mut changed, &order);
+    changed
+}

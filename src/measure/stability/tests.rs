@@ -1,0 +1,198 @@
+use super::*;
+use crate::mesh::Mesh;
+use crate::mesh::shapes::{octasphere, torus_knot};
+use crate::numeric::vector::{Vec3, length, sub};
+use crate::volume::bits::BitGrid;
+use crate::volume::{Data, Frame, Volume};
+
+fn ball() -> Mesh {
+    octasphere([0.3, -0.2, 0.1], 1.25, 8)
+}
+
+#[test]
+fn motions_are_undone() {
+    let p = [0.3, -1.7, 2.25];
+    let turn = Motion::turn([1.0, 2.0, 3.0], 1.0);
+    let both = Motion {
+        exponent: 7,
+        shift: [4.0, 5.0, -6.0],
+        ..turn
+    };
+    assert!(length(sub(both.undo(both.apply(p)), p)) < 1e-14);
+    assert!((length(turn.apply(p)) - length(p)).abs() < 1e-14);
+    for axis in 0..3 {
+        let quarter = Motion::quarter_turn(axis);
+        let full = (0..4).fold(p, |p, _| quarter.apply(p));
+        assert_eq!((full, quarter.undo(quarter.apply(p))), (p, p));
+        let mut unit = [0.0; 3];
+        unit[axis] = 1.0;
+        let same = Motion::turn(unit, std::f64::consts::FRAC_PI_2);
+        assert!(length(sub(same.apply(p), quarter.apply(p))) < 1e-14);
+    }
+    let scaled = Motion::scale(-3).place(&[8.0, 16.0, 0.0, 9.0, 17.0, 1.0]);
+    assert_eq!(scaled, Ok(vec![1.0, 2.0, 0.0, 1.125, 2.125, 0.125]));
+    let turned = Motion::quarter_turn(2).place(&[1.0, 2.0, 3.0, 4.0, 6.0, 9.0]);
+    assert_eq!(turned, Ok(vec![-6.0, 1.0, 3.0, -2.0, 4.0, 9.0]));
+    assert!(turn.place(&[0.0, 0.0, 0.0, 1.0, 1.0, 1.0]).is_err());
+    assert_eq!(
+        Motion::shift([1.0; 3]).place(&[1.0, 2.0, 3.0]),
+        Ok(vec![2.0, 3.0, 4.0])
+    );
+    assert!(turn.place(&[1.0]).is_err());
+}
+
+#[test]
+fn a_shift_that_rounds_says_what_was_moved_exactly() {
+    let mesh = ball();
+    let near = Step::Scale(-100).apply(&mesh, 0).expect("a mesh");
+    assert_eq!((near.rounding, &near.rounded), (Rounding::default(), &None));
+    let far = Step::Shift(1e9).apply(&mesh, 0).expect("a mesh");
+    let rounded = far.rounded.expect("coordinates that are rounded");
+    assert!(far.rounding.relative > 1e-10 && far.rounding.relative < 1e-6);
+    assert!(far.rounding.ulps > 1.0);
+    for (there, here) in far.mesh.positions.iter().zip(&rounded.positions) {
+        assert_eq!(far.motion.apply(*here), *there);
+        assert_eq!(far.motion.undo(*there), *here);
+    }
+    let again = Step::Shift(1e9).apply(&rounded, 0).expect("a mesh");
+    assert_eq!((again.rounding, again.rounded), (Rounding::default(), None));
+    assert!(
+        Step::Scale(1020)
+            .apply(
+                &Mesh {
+                    positions: vec![[1e10; 3]],
+                    ..Mesh::default()
+                },
+                0
+            )
+            .is_err()
+    );
+}
+
+#[test]
+fn elements_are_rearranged_and_stay_the_same() {
+    let mesh = ball();
+    let corners = |mesh: &Mesh| {
+        let triangles =
+            (0..mesh.triangles.len()).map(|t| mesh.corners(t).map(|p| p.map(f64::to_bits)));
+        let mut all: Vec<_> = triangles.collect();
+        all.sort_unstable();
+        all
+    };
+    let wanted = corners(&mesh);
+    for step in [Step::VertexOrder, Step::FaceOrder, Step::SplitVertices] {
+        let changed = step.apply(&mesh, 7).expect("a mesh").mesh;
+        assert_eq!(changed.check(), Ok(()));
+        assert_eq!(corners(&changed), wanted, "{step:?}");
+        assert!(changed != mesh, "{step:?}");
+    }
+    let split = Step::SplitVertices.apply(&mesh, 0).expect("a mesh").mesh;
+    assert_eq!(split.positions.len(), 3 * mesh.triangles.len());
+    let twice = Step::DuplicateFaces.apply(&mesh, 0).expect("a mesh").mesh;
+    assert_eq!(twice.triangles.len(), 2 * mesh.triangles.len());
+    let more = Step::DegenerateFaces.apply(&mesh, 0).expect("a mesh").mesh;
+    let flat = &more.triangles[mesh.triangles.len()..];
+    assert!(flat.len() == 64 && flat.iter().all(|[a, b, c]| b == c || a == b));
+    assert!(Step::DegenerateFaces.apply(&Mesh::default(), 0).is_err());
+    let jitter = Step::Jitter.apply(&mesh, 0).expect("a mesh");
+    assert_eq!(jitter.rounding.ulps, 1.0);
+}
+
+fn volume(dims: [usize; 3], origin: Vec3, set: &[[usize; 3]]) -> Volume {
+    let mut grid = BitGrid::new(dims);
+    set.iter().for_each(|[x, y, z]| grid.set(*x, *y, *z));
+    Volume {
+        frame: Frame::straight(dims, origin, [0.5; 3]),
+        data: Data::Bits(grid),
+    }
+}
+
+#[test]
+fn voxels_drift_by_those_that_differ_and_by_how_far() {
+    let a = volume([8; 3], [0.25; 3], &[[1, 1, 1], [4, 4, 4]]);
+    let same = volume_drift(&a, &a, &Motion::NONE);
+    assert_eq!(
+        (same.differing, same.distance, same.place),
+        (Some(0), Some(0.0), 0.0)
+    );
+    let b = volume([8; 3], [0.25; 3], &[[1, 1, 1], [4, 4, 6]]);
+    let drift = volume_drift(&a, &b, &Motion::NONE);
+    assert_eq!((drift.differing, drift.distance), (Some(2), Some(1.0)));
+    // The same voxels in a larger grid that starts two voxels before.
+    let wider = volume([12; 3], [-0.75; 3], &[[3, 3, 3], [6, 6, 6]]);
+    assert_eq!(volume_drift(&a, &wider, &Motion::NONE), same);
+    let empty = volume([8; 3], [0.25; 3], &[]);
+    let drift = volume_drift(&a, &empty, &Motion::NONE);
+    assert_eq!((drift.differing, drift.distance), (Some(2), None));
+    assert_eq!(volume_drift(&empty, &empty, &Motion::NONE), same);
+}
+
+#[test]
+fn voxels_that_moved_along_did_not_drift() {
+    let a = volume([8; 3], [0.25; 3], &[[1, 2, 3], [4, 4, 4], [7, 0, 5]]);
+    let mut b = a.clone();
+    let motion = Motion {
+        exponent: -80,
+        shift: [3.0, -1.0, 2f64.powi(-70)],
+        ..Motion::NONE
+    };
+    b.frame = Frame::straight([8; 3], motion.apply([0.25; 3]), [2f64.powi(-81); 3]);
+    // At 3 the origin keeps no digit of a grid this small.
+    assert!(
+        volume_drift(
+            &a,
+            &b,
+            &Motion {
+                shift: [0.0; 3],
+                ..motion
+            }
+        )
+        .differing
+            > Some(0)
+    );
+    let motion = Motion::scale(-80);
+    b.frame = Frame::straight([8; 3], motion.apply([0.25; 3]), [2f64.powi(-81); 3]);
+    let drift = volume_drift(&a, &b, &motion);
+    assert_eq!((drift.differing, drift.place), (Some(0), 0.0));
+    let turn = Motion::quarter_turn(2);
+    // (x, y) goes to (-y, x): the grid's lower corner moves to x = -4.
+    let c = volume(
+        [8; 3],
+        [-3.75, 0.25, 0.25],
+        &[[5, 1, 3], [3, 4, 4], [7, 7, 5]],
+    );
+    assert_eq!(volume_drift(&a, &c, &turn).differing, Some(0));
+}
+
+#[test]
+fn meshes_drift_by_their_distance() {
+    let mesh = torus_knot(2, 3, 3.0, 32, 6);
+    let changed = Step::Turn.apply(&mesh, 0).expect("a mesh");
+    let drift = mesh_drift(&mesh, &changed.mesh, &changed.motion).expect("meshes");
+    assert!(drift.distance.is_some_and(|d| d < 1e-12), "{drift:?}");
+    let off = Motion::shift([0.0, 0.0, 0.5]);
+    let drift = mesh_drift(&mesh, &mesh, &off).expect("meshes");
+    assert!(
+        drift.distance.is_some_and(|d| d > 0.1 && d <= 0.5),
+        "{drift:?}"
+    );
+}
+
+#[test]
+fn results_reach_as_far_as_all_nearer_steps_hold() {
+    let steps = [
+        (Step::Scale(-5), true),
+        (Step::Scale(-50), false),
+        (Step::Scale(-100), true),
+        (Step::Scale(7), true),
+        (Step::Shift(1e3), true),
+        (Step::Shift(1.0), true),
+    ];
+    let wanted = Reach {
+        smallest_scale: Some(-5),
+        largest_scale: Some(7),
+        offset: Some(1e3),
+    };
+    assert_eq!(Reach::of(&steps), wanted);
+    assert_eq!(Reach::of(&[(Step::Scale(1), false)]).largest_scale, None);
+}

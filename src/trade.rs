@@ -1,0 +1,123 @@
+//! What a command trades for what: declared once, beside its `Params`.
+//!
+//! `scantle tradeoff` and `scantle stability` read nothing else about a command, and know none by
+//! its name.
+
+/// The trade of one command.
+#[derive(Debug, Clone, Copy)]
+pub struct Trade {
+    /// The options that buy accuracy with time or memory.
+    pub knobs: &'static [Knob],
+    /// The one of the report's measures that compares all settings.
+    pub error: Measure,
+    /// What that error is verified against.
+    pub reference: &'static str,
+    /// Name of the format that holds every result without loss.
+    pub result: &'static str,
+    /// Options whose value is a length in the input's unit; they are scaled with it.
+    pub lengths: &'static [&'static str],
+    /// Options whose value is a point of the input's space (three numbers) or a box along its axes
+    /// (six: lower corner, then upper); they are moved with it.
+    pub points: &'static [&'static str],
+    /// What the result does not depend on.
+    pub invariant: &'static [Invariance],
+}
+
+/// An option that buys accuracy with time or memory.
+#[derive(Debug, Clone, Copy)]
+pub struct Knob {
+    /// The long option, without dashes.
+    pub name: &'static str,
+    /// Some of its values, cheapest first.
+    pub ladder: &'static [&'static str],
+    /// Whether its values are numbers, of which the smaller are cheaper; else they are names, and
+    /// what the ladder leaves out is cheaper than all of it.
+    pub numeric: bool,
+}
+
+/// A measure of the report's `accuracy`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Measure {
+    /// Its name in the report.
+    pub name: &'static str,
+    /// Its unit in the report.
+    pub unit: &'static str,
+}
+
+/// A change of the input, or of its place, that changes nothing in the result but what must change.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Invariance {
+    /// The change.
+    pub under: Change,
+    /// Options on whose value it depends, with the value that it needs: `("fill", "none")`.
+    pub only: &'static [(&'static str, &'static str)],
+}
+
+impl Invariance {
+    /// An invariance under every setting.
+    pub const fn always(under: Change) -> Self {
+        Invariance { under, only: &[] }
+    }
+}
+
+/// The changes of an input under which stability is measured.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Change {
+    /// All coordinates times a power of two.
+    Scale,
+    /// All points moved by one vector.
+    Shift,
+    /// Turned by 90 degrees about an axis of the coordinates.
+    QuarterTurn,
+    /// Turned about an axis that is none of the coordinates'.
+    Turn,
+    /// Vertices in another order.
+    VertexOrder,
+    /// Elements in another order.
+    FaceOrder,
+    /// Vertices of their own for every element.
+    SplitVertices,
+    /// Every element twice.
+    DuplicateFaces,
+    /// Triangles without area added at vertices in use.
+    DegenerateFaces,
+    /// Every coordinate one bit up, down, or as it is.
+    Jitter,
+}
+
+impl Change {
+    /// Stable name for reports.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Change::Scale => "scale",
+            Change::Shift => "shift",
+            Change::QuarterTurn => "quarter-turn",
+            Change::Turn => "turn",
+            Change::VertexOrder => "vertex-order",
+            Change::FaceOrder => "face-order",
+            Change::SplitVertices => "split-vertices",
+            Change::DuplicateFaces => "duplicate-faces",
+            Change::DegenerateFaces => "degenerate-faces",
+            Change::Jitter => "jitter",
+        }
+    }
+}
+
+impl Trade {
+    /// The knob of a long option.
+    pub fn knob(&self, name: &str) -> Option<&'static Knob> {
+        self.knobs.iter().find(|knob| knob.name == name)
+    }
+
+    /// Whether the result is declared not to depend on a change, where `value` tells the value of
+    /// an option.
+    pub fn is_invariant(&self, under: Change, value: impl Fn(&str) -> Option<String>) -> bool {
+        self.invariant.iter().any(|row| {
+            row.under == under
+                && row
+                    .only
+                    .iter()
+                    .all(|(option, needed)| value(option).as_deref() == Some(*needed))
+        })
+    }
+}

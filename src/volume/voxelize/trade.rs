@@ -1,0 +1,59 @@
+//! The trade that voxelizing is: finer voxels, looser rules.
+
+use crate::trade::{Change, Invariance, Knob, Measure, Trade};
+
+/// The measure that compares resolutions, modes and fills.
+pub(super) const TWO_SIDED: Measure = Measure {
+    name: "largest distance between the model and the voxels, either way",
+    unit: "file unit",
+};
+
+/// What voxelizing trades for what.
+pub const TRADE: Trade = Trade {
+    knobs: &[
+        Knob {
+            name: "resolution",
+            ladder: &["32", "64", "128", "256"],
+            numeric: true,
+        },
+        Knob {
+            name: "mode",
+            // `none` sets nothing unless a fill is asked for too.
+            ladder: &["z", "three-axis", "conservative"],
+            numeric: false,
+        },
+        Knob {
+            name: "fill",
+            ladder: &["none", "parity", "winding"],
+            numeric: false,
+        },
+        Knob {
+            name: "grid",
+            ladder: &["auto", "dense", "sparse"],
+            numeric: false,
+        },
+        Knob {
+            name: "levels",
+            ladder: &["xyz", "xy"],
+            numeric: false,
+        },
+    ],
+    error: TWO_SIDED,
+    reference: "exact closest points of the model and its samples",
+    result: "svo",
+    lengths: &["voxel-size"],
+    points: &["bounds"],
+    invariant: &[
+        Invariance::always(Change::Scale),
+        Invariance::always(Change::Shift),
+        Invariance::always(Change::VertexOrder),
+        Invariance::always(Change::FaceOrder),
+        Invariance::always(Change::SplitVertices),
+        Invariance::always(Change::DegenerateFaces),
+        // Two surfaces at one place are two crossings, and wind twice.
+        Invariance {
+            under: Change::DuplicateFaces,
+            only: &[("fill", "none")],
+        },
+    ],
+};

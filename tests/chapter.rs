@@ -1,0 +1,170 @@
+//! The manual's chapter on the trade, `man/trade.md`: from real runs on the fixtures.
+//!
+//! `UPDATE_TRADE=1 cargo test --release --test all chapter` writes it anew. The test holds it to
+//! the errors, which do not vary, and not to the seconds.
+
+use crate::support::{Workplace, root, updating};
+use serde_json::Value;
+use std::fmt::Write;
+use std::fs;
+
+/// A command's part of the chapter.
+struct Part {
+    command: &'static str,
+    /// Its input and options.
+    words: &'static str,
+    vary: &'static str,
+    /// Which setting to choose and why.
+    advice: &'static str,
+    /// Options for the run at the extremes.
+    extremes: &'static str,
+}
+
+const PARTS: &[Part] = &[Part {
+    command: "voxelize",
+    words: "fixtures/shapes/torus-knot.ply",
+    vary: "--vary resolution=16,32,64,128 --vary mode --repeat 5",
+    advice: "Choose `three-axis` where voxels are to lie near the surface: at one resolution it errs least, for it sets no voxel that the surface only grazes. Choose `conservative` where nothing may be missed: it alone has a proven bound, and one step up in resolution buys the difference back.",
+    extremes: "--resolution 48",
+}];
+
+const OPENING: &str = "\
+# The trade
+
+What the settings of each command cost, how exact they are, and how far its results hold. Each part is a real run on a file of this repository; the seconds are those of the machine that wrote it, the errors are the same everywhere. Run the lines on your own data.
+";
+
+fn run(place: &Workplace, line: &str) -> Value {
+    let ran = place.run(line);
+    assert_eq!(ran.code, 0, "{line}: {}", ran.stderr);
+    ran.document()
+}
+
+/// A figure in four digits.
+fn figure(value: &Value) -> String {
+    value
+        .as_f64()
+        .map_or("none".to_owned(), |v| format!("{v:.4}"))
+}
+
+/// The lines of the table: setting, error, bound and share, which do not vary, then the costs.
+fn table(report: &Value) -> Vec<(String, String)> {
+    let rows = report["result"]["rows"].as_array().expect("rows");
+    let line = |row: &Value| {
+        let setting = row["setting"].as_object().expect("a setting");
+        let mut fixed: Vec<String> = setting
+            .values()
+            .map(|v| v.as_str().map_or_else(|| v.to_string(), str::to_owned))
+            .collect();
+        let share = row["modelled"]["share"].as_f64().expect("a share");
+        fixed.extend([
+            figure(&row["error"]),
+            figure(&row["bound"]),
+            format!("{:.2} %", 100.0 * share),
+        ]);
+        let seconds = row["wall_s"]["median"].as_f64().expect("seconds");
+        let peak = row["peak_bytes"]
+            .as_f64()
+            .map_or("-".to_owned(), |b| format!("{:.1}", b / 1048576.0));
+        let front = if row["on_front"] == true { "front" } else { "" };
+        let costs = format!("{:.2} | {peak} | {front} |", 1e3 * seconds);
+        (format!("| {} |", fixed.join(" | ")), costs)
+    };
+    rows.iter().map(line).collect()
+}
+
+/// How far results hold, in a sentence.
+fn reach(result: &Value) -> String {
+    let name = |key: &str| result["unchanged"][key].to_string();
+    format!(
+        "No result changes under scales from 2^{} to 2^{} and offsets up to {} extents; the largest drift under all that the command promises to bear is {}.",
+        name("smallest_scale"),
+        name("largest_scale"),
+        name("offset"),
+        result["drift"]
+    )
+}
+
+#[test]
+fn the_chapter_on_the_trade_is_current() {
+    let place = Workplace::new();
+    let named = place.run("tradeoff nonsense --vary x").stderr;
+    let with_trade: Vec<&str> = PARTS.iter().map(|part| part.command).collect();
+    let wanted = format!("those with a trade: {}\n", with_trade.join(", "));
+    assert!(
+        named.ends_with(&wanted),
+        "a command without a part: {named}"
+    );
+
+    let path = root().join("man/trade.md");
+    let kept = fs::read_to_string(&path).unwrap_or_default();
+    let mut text = OPENING.to_owned();
+    let mut missing = Vec::new();
+    for Part {
+        command,
+        words,
+        vary,
+        advice,
+        extremes,
+    } in PARTS
+    {
+        let trade = format!("tradeoff {command} {words} {vary}");
+        let report = run(&place, &format!("{trade} -q --plot plot.svg"));
+        assert!(
+            !report["result"]["front"]
+                .as_array()
+                .expect("a front")
+                .is_empty()
+        );
+        let extreme = format!("stability {command} {words} {extremes}");
+        let held = reach(&run(&place, &format!("{extreme} -q"))["result"]);
+        let first = &report["result"]["rows"][0]["setting"];
+        let knobs: Vec<&str> = first
+            .as_object()
+            .expect("a setting")
+            .keys()
+            .map(String::as_str)
+            .collect();
+        let error = &report["result"]["error"];
+        let (measure, unit) = (error["measure"].as_str(), error["unit"].as_str());
+        let _ = write!(
+            text,
+            "\n## {command}\n\n```sh\nscantle {trade}\n```\n\nThe error is the {} ({}).\n\n",
+            measure.unwrap_or_default(),
+            unit.unwrap_or_default()
+        );
+        let _ = writeln!(
+            text,
+            "| {} | error | bound | modelled | ms | MiB | |",
+            knobs.join(" | ")
+        );
+        let _ = writeln!(text, "|{}", "---|".repeat(knobs.len() + 6));
+        for (fixed, costs) in table(&report) {
+            if !kept.contains(&format!("\n{fixed} ")) {
+                missing.push(fixed.clone());
+            }
+            let _ = writeln!(text, "{fixed} {costs}");
+        }
+        let _ = write!(
+            text,
+            "\n![Error against time, the front marked](trade-{command}.svg)\n\n{advice}\n\n```sh\nscantle {extreme}\n```\n\n{held}\n"
+        );
+        if !kept.contains(&format!("\n{held}\n")) {
+            missing.push(held);
+        }
+        if updating("UPDATE_TRADE") {
+            let plot = fs::read(place.path("plot.svg")).expect("the plot");
+            fs::write(root().join(format!("man/trade-{command}.svg")), plot).expect("a plot");
+        }
+    }
+    if updating("UPDATE_TRADE") {
+        fs::write(&path, text).expect("the chapter");
+        return;
+    }
+    let way_out = "run `UPDATE_TRADE=1 cargo test --release --test all chapter`";
+    assert!(
+        missing.is_empty(),
+        "not in man/trade.md: {missing:#?}\n{way_out}"
+    );
+    assert!(kept.contains("| front |"));
+}
