@@ -4,23 +4,30 @@ use crate::context::{Context, Files};
 use crate::exit::Exit;
 use crate::job::{Found, Job};
 use crate::shared::{Common, InputFormat, Seed, not_negative};
+use crate::words;
 use scantle::error::Result;
 use scantle::image::samples::Image;
 use scantle::io::Content;
 use scantle::measure::image_difference::{self, ImageDifference};
 use scantle::measure::mesh_distance::{self, MeshDifference};
+use scantle::measure::report_difference::{self, ReportDifference};
 use scantle::measure::volume_difference::{self, VolumeDifference};
 use scantle::mesh::Mesh;
 use scantle::report::Measures;
 use scantle::volume::Volume;
 use schemars::JsonSchema;
 use serde::Serialize;
+use serde_json::Value;
 
-/// Measure how far two meshes, volumes or images are from each other
+/// Measure how far two meshes, volumes, images or reports are from each other
 ///
 /// Meshes: the Hausdorff distance with a proven bound, mean and root mean square distances, area
 /// and volume. Volumes of the same dimensions: the voxels that differ, and by how much. Images of
 /// the same size: the pixels that differ, the largest difference of a channel, PSNR and SSIM.
+/// Reports, or any other JSON: what differs, each place named by its JSON pointer, and the largest
+/// relative difference of two numbers. JSON Lines are compared document by document. Of two reports
+/// of scantle, what depends on the run and not on the result is left out: the block `run`, and the
+/// `path` of each input and output.
 #[derive(Debug, clap::Args)]
 #[command(after_long_help = EXAMPLES)]
 pub struct Args {
@@ -31,12 +38,16 @@ pub struct Args {
     format: InputFormat,
     /// Exit with 1 when they differ by more than X: for meshes the Hausdorff distance in the file's
     /// unit, for volumes the number of voxels that differ, for images the largest difference of a
-    /// channel in steps of eight bits (255 is full)
+    /// channel in steps of eight bits (255 is full), for reports the largest relative difference of
+    /// two numbers, |a - b| / max(|a|, |b|), while any other difference fails
     #[arg(long, value_name = "X", value_parser = not_negative)]
     tolerance: Option<f64>,
     /// Points spread over each mesh for mean and root mean square
     #[arg(long, value_name = "N", default_value_t = mesh_distance::Params::DEFAULT.samples)]
     samples: u64,
+    /// Compare reports whole: `run` and paths too
+    #[arg(long)]
+    everything: bool,
     #[command(flatten)]
     seed: Seed,
     #[command(flatten)]
@@ -50,7 +61,7 @@ Examples:
 ";
 
 /// What was asked for.
-#[derive(Debug, Serialize, JsonSchema)]
+#[derive(Debug, Default, Serialize, JsonSchema)]
 pub struct Params {
     /// The largest difference allowed, null without a check.
     tolerance: Option<f64>,
@@ -60,6 +71,9 @@ pub struct Params {
     /// How volumes were compared.
     #[serde(skip_serializing_if = "Option::is_none")]
     volume: Option<volume_difference::Params>,
+    /// How reports were compared.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    report: Option<report_difference::Params>,
 }
 
 /// How they differ.
@@ -72,43 +86,66 @@ pub enum Stats {
     Volume(Box<VolumeDifference>),
     /// Two images.
     Image(Box<ImageDifference>),
+    /// Two reports, or other files of JSON.
+    Report(Box<ReportDifference>),
 }
 
 /// The report of this command.
 pub type Report = scantle::report::Report<Params, Stats>;
 
+/// What the comparison of two things of one kind found.
+type Compared = Result<Found<Params, Stats>>;
+
 /// Compares the two.
 pub fn run(args: &Args) -> Result<Exit> {
     let context = Context::new(&args.common)?;
-    let params = mesh_distance::Params {
-        samples: args.samples,
-        seed: args.seed.seed,
-        ..mesh_distance::Params::DEFAULT
-    };
-    params.check()?;
+    args.for_meshes().check()?;
+    args.for_reports().check()?;
     let files = Files::together(&args.inputs, &args.format);
     context.run("compare", &files, |job| {
         let found = match job.read()? {
-            Content::Mesh(a) => meshes(job, &a, params, args.tolerance),
-            Content::Volume(a) => volumes(job, &a, args.tolerance),
-            Content::Image(a) => images(job, &a, args.tolerance),
+            Content::Mesh(a) => meshes(job, &a, args),
+            Content::Volume(a) => volumes(job, &a, args),
+            Content::Image(a) => images(job, &a, args),
+            Content::Report(a) => reports(job, &a, args),
         };
         Ok(found?.check("tolerance", args.tolerance))
     })
 }
 
-fn meshes(
-    job: &mut Job,
-    a: &Mesh,
-    params: mesh_distance::Params,
-    tolerance: Option<f64>,
-) -> Result<Found<Params, Stats>> {
+impl Args {
+    /// The parameters that every kind has.
+    fn for_any_kind(&self) -> Params {
+        Params {
+            tolerance: self.tolerance,
+            ..Params::default()
+        }
+    }
+
+    fn for_meshes(&self) -> mesh_distance::Params {
+        mesh_distance::Params {
+            samples: self.samples,
+            seed: self.seed.seed,
+            ..mesh_distance::Params::DEFAULT
+        }
+    }
+
+    fn for_reports(&self) -> report_difference::Params {
+        let default = report_difference::Params::DEFAULT;
+        report_difference::Params {
+            tolerance: self.tolerance.unwrap_or(default.tolerance),
+            everything: self.everything,
+        }
+    }
+}
+
+fn meshes(job: &mut Job, a: &Mesh, args: &Args) -> Compared {
     let b = job.read_mesh()?;
+    let params = args.for_meshes();
     let difference = mesh_distance::compare(a, &b, &params, job.progress())?;
     let params = Params {
-        tolerance,
         mesh: Some(params),
-        volume: None,
+        ..args.for_any_kind()
     };
     let summary = format!(
         "hausdorff distance {} (at most {}), rms {}",
@@ -118,15 +155,14 @@ fn meshes(
     Ok(Found::new(params, Stats::Mesh(Box::new(difference)), summary).accuracy(accuracy))
 }
 
-fn volumes(job: &mut Job, a: &Volume, tolerance: Option<f64>) -> Result<Found<Params, Stats>> {
+fn volumes(job: &mut Job, a: &Volume, args: &Args) -> Compared {
     let b = job.read_volume()?;
     let params = volume_difference::Params::DEFAULT;
     let difference = volume_difference::compare(a, &b, &params, job.progress())?;
     job.warn(difference.warnings());
     let params = Params {
-        tolerance,
-        mesh: None,
         volume: Some(params),
+        ..args.for_any_kind()
     };
     let (differing, voxels) = (difference.differing, difference.voxels);
     let summary = format!("{differing} of {voxels} voxels differ");
@@ -134,17 +170,43 @@ fn volumes(job: &mut Job, a: &Volume, tolerance: Option<f64>) -> Result<Found<Pa
     Ok(Found::new(params, Stats::Volume(Box::new(difference)), summary).accuracy(accuracy))
 }
 
-fn images(job: &mut Job, a: &Image, tolerance: Option<f64>) -> Result<Found<Params, Stats>> {
+fn images(job: &mut Job, a: &Image, args: &Args) -> Compared {
     let b = job.read_image()?;
     job.expect_room("comparing two images", image_difference::room(a))?;
     let difference = image_difference::compare(a, &b, job.progress())?;
-    let params = Params {
-        tolerance,
-        mesh: None,
-        volume: None,
-    };
+    let params = args.for_any_kind();
     let (differing, pixels, max) = (difference.differing, difference.pixels, difference.max);
     let summary = format!("{differing} of {pixels} pixels differ, by at most {max} of 255");
     let accuracy = Measures::One(difference.accuracy());
     Ok(Found::new(params, Stats::Image(Box::new(difference)), summary).accuracy(accuracy))
+}
+
+fn reports(job: &mut Job, a: &[Value], args: &Args) -> Compared {
+    let b = job.read_report()?;
+    let params = args.for_reports();
+    let difference = report_difference::compare(a, &b, &params, job.progress())?;
+    let params = Params {
+        report: Some(params),
+        ..args.for_any_kind()
+    };
+    let (differing, within) = (difference.differing, difference.within);
+    let mut summary = words::counted(differing, "difference", "differences");
+    summary += &format!(
+        " in {}",
+        words::counted(difference.values, "value", "values")
+    );
+    if within > 0 {
+        summary += &format!(", {within} more within the tolerance");
+    }
+    let worst = difference.worst.as_ref().map(ToString::to_string);
+    if let Some(worst) = &worst {
+        summary += &format!("; the worst is {worst}");
+    }
+    let beyond = worst.filter(|_| difference.other > 0);
+    let accuracy = Measures::One(difference.accuracy());
+    Ok(
+        Found::new(params, Stats::Report(Box::new(difference)), summary)
+            .accuracy(accuracy)
+            .beyond_measure(beyond),
+    )
 }

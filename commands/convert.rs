@@ -5,9 +5,9 @@ use crate::exit::Exit;
 use crate::job::{Found, Job};
 use crate::shared::{Common, Inputs, Output};
 use crate::words;
-use scantle::error::Result;
+use scantle::error::{Error, Fault, Result};
 use scantle::io;
-use scantle::io::format::Format;
+use scantle::io::format::{Format, Kind};
 use schemars::JsonSchema;
 use serde::Serialize;
 
@@ -59,11 +59,16 @@ pub fn run(args: &Args) -> Result<Exit> {
 fn convert(job: &mut Job) -> Result<Found<Params, Stats>> {
     let content = job.read()?;
     let kind = content.kind();
+    if kind == Kind::Report {
+        let fault = Fault::whole("holds a report (json), which is written in no other format");
+        let hint = "scantle info and scantle compare take reports";
+        return Err(Error::Geometry(fault.with_hint(hint)));
+    }
     job.expect_output(&[kind])?;
     match &content {
         io::Content::Mesh(mesh) => job.write_mesh(mesh)?,
         io::Content::Volume(volume) => job.write_volume(volume)?,
-        io::Content::Image(_) => {
+        io::Content::Image(_) | io::Content::Report(_) => {
             if let Some(format) = job.output_format() {
                 return Err(io::cannot_hold(format, kind));
             }

@@ -38,7 +38,7 @@ pub struct Table {
 struct Row {
     /// Its name, for `--input-format` and `--output-format`.
     name: &'static str,
-    /// What it holds: `mesh`, `volume` or `image`.
+    /// What it holds: `mesh`, `volume`, `image` or `report`.
     kind: &'static str,
     /// File name extensions, the usual one first.
     extensions: &'static [&'static str],

@@ -8,13 +8,15 @@ use crate::words;
 use scantle::error::Result;
 use scantle::io::Content;
 use scantle::mesh::topology::{Topology, topology};
+use scantle::report::{Made, made_by};
 use scantle::volume::Volume;
 use schemars::JsonSchema;
 use serde::Serialize;
 
 /// Tell what is in a file, and what looks wrong with it
 ///
-/// Counts, bounds and, of a mesh, its topology: whether it is closed, oriented and manifold.
+/// Counts, bounds and, of a mesh, its topology: whether it is closed, oriented and manifold. Of
+/// JSON, the documents, and which commands they are reports of.
 #[derive(Debug, clap::Args)]
 #[command(after_long_help = EXAMPLES)]
 pub struct Args {
@@ -30,6 +32,9 @@ Examples:
   scantle info fixtures/shapes/*.obj --report shapes.jsonl
 ";
 
+/// Commands and versions that are named to a person.
+const NAMED: usize = 4;
+
 /// This command has no parameters.
 #[derive(Debug, Serialize, JsonSchema)]
 pub struct Params {}
@@ -44,6 +49,8 @@ pub enum Stats {
     Volume(VolumeStats),
     /// Pixels.
     Image(ImageStats),
+    /// JSON documents.
+    Report(ReportStats),
 }
 
 /// What is in a volume.
@@ -76,6 +83,15 @@ pub struct ImageStats {
     channels: u64,
     /// Bits of a sample.
     bits: u32,
+}
+
+/// What is in a file of JSON.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct ReportStats {
+    /// Documents.
+    documents: u64,
+    /// Those of them that are reports of scantle, by command and version.
+    reports: Vec<Made>,
 }
 
 /// The report of this command.
@@ -112,8 +128,30 @@ fn look(job: &mut Job) -> Result<Found<Params, Stats>> {
             channels: image.channels as u64,
             bits: image.bits(),
         }),
+        Content::Report(documents) => {
+            let reports = made_by(&documents);
+            summary += &made_in_words(&reports);
+            Stats::Report(ReportStats {
+                documents: documents.len() as u64,
+                reports,
+            })
+        }
     };
     Ok(Found::new(Params {}, stats, summary))
+}
+
+/// `, 2 reports of info by scantle 0.1.0`, for the first few.
+fn made_in_words(reports: &[Made]) -> String {
+    let mut text = String::new();
+    for made in reports.iter().take(NAMED) {
+        let count = words::counted(made.documents, "report", "reports");
+        let [command, version] = [&made.command, &made.scantle].map(|word| words::shown(word));
+        text += &format!(", {count} of {command} by scantle {version}");
+    }
+    if reports.len() > NAMED {
+        text += &format!(", and reports of {} more kinds", reports.len() - NAMED);
+    }
+    text
 }
 
 fn volume_stats(volume: &Volume) -> VolumeStats {

@@ -20,6 +20,7 @@ use scantle::report::{
 };
 use scantle::volume::Volume;
 use serde::Serialize;
+use serde_json::Value;
 
 /// What a command found: the part of the report that is its own.
 pub struct Found<P, R> {
@@ -29,6 +30,7 @@ pub struct Found<P, R> {
     accuracy: Option<Measures>,
     modelled: Option<Modelled>,
     check: Option<(&'static str, f64)>,
+    beyond: Option<String>,
 }
 
 impl<P, R> Found<P, R> {
@@ -41,6 +43,7 @@ impl<P, R> Found<P, R> {
             accuracy: None,
             modelled: None,
             check: None,
+            beyond: None,
         }
     }
 
@@ -62,9 +65,18 @@ impl<P, R> Found<P, R> {
         self
     }
 
+    /// With what no measure tells, if there is anything: the check fails for it, whatever it allows.
+    pub fn beyond_measure(mut self, what: Option<String>) -> Self {
+        self.beyond = what;
+        self
+    }
+
     /// Why the check fails, if it was asked for and does. It is about the first measure.
     fn failure(&self) -> Option<String> {
         let (option, most) = self.check?;
+        if let Some(what) = &self.beyond {
+            return Some(format!("{what}, which no --{option} allows"));
+        }
         let first = match &self.accuracy {
             Some(Measures::One(accuracy)) => Some(accuracy),
             Some(Measures::Many(all)) => all.first(),
@@ -177,6 +189,11 @@ impl<'a> Job<'a> {
     /// Reads the next input, which must be an image.
     pub fn read_image(&mut self) -> Result<Image> {
         self.read_with(io::read_image)
+    }
+
+    /// Reads the next input, which must be JSON.
+    pub fn read_report(&mut self) -> Result<Vec<Value>> {
+        self.read_with(io::read_report)
     }
 
     fn read_with<T>(
@@ -381,5 +398,17 @@ mod tests {
         assert!(found(None, None, Some(0.5)).failure().is_some());
         let nothing: Found<(), ()> = Found::new((), (), "").check("max-error", Some(1.0));
         assert!(nothing.failure().is_some());
+    }
+
+    #[test]
+    fn what_no_measure_tells_fails_only_a_check() {
+        let beyond = |most| found(Some(0.0), None, most).beyond_measure(Some("x is gone".into()));
+        assert_eq!(beyond(None).failure(), None);
+        assert_eq!(
+            beyond(Some(9.0)).failure().as_deref(),
+            Some("x is gone, which no --max-error allows")
+        );
+        let nothing = found(Some(0.0), None, Some(0.0)).beyond_measure(None);
+        assert_eq!(nothing.failure(), None);
     }
 }

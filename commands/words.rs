@@ -16,7 +16,7 @@ pub fn json(value: &impl Serialize, spread: bool) -> Vec<u8> {
     text
 }
 
-/// `8 vertices, 12 triangles`, `64 x 64 x 32 voxels of u8`.
+/// `8 vertices, 12 triangles`, `64 x 64 x 32 voxels of u8`, `1 document`.
 pub fn content(content: &Content) -> String {
     let mut parts = Vec::new();
     let counts = [
@@ -24,6 +24,7 @@ pub fn content(content: &Content) -> String {
         (content.triangles, "triangle", "triangles"),
         (content.segments, "segment", "segments"),
         (content.points, "point", "points"),
+        (content.documents, "document", "documents"),
     ];
     for (count, one, many) in counts {
         if let Some(count) = count {
@@ -45,6 +46,11 @@ pub fn content(content: &Content) -> String {
 /// `1 vertex`, `8 vertices`.
 pub fn counted(count: u64, one: &str, many: &str) -> String {
     format!("{count} {}", if count == 1 { one } else { many })
+}
+
+/// A word from a file, short and without what a terminal takes for a command.
+pub fn shown(word: &str) -> String {
+    word.chars().take(32).flat_map(char::escape_debug).collect()
 }
 
 /// What was read.

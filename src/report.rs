@@ -2,6 +2,8 @@
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use serde_json::Value;
+use std::collections::BTreeMap;
 
 /// The version of the envelope. Adding a field keeps it; renaming or removing one raises it.
 pub const SCHEMA: u32 = 1;
@@ -85,6 +87,9 @@ pub struct Content {
     /// Bits of a sample of an image.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub bits: Option<u32>,
+    /// Documents of a JSON file.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub documents: Option<u64>,
     /// Smallest and largest coordinate: `[[x, y, z], [x, y, z]]`, null when there is none.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub bounds: Option<[[f64; 3]; 2]>,
@@ -101,6 +106,47 @@ pub struct Output {
     pub bytes: u64,
     /// SHA-256 of the bytes as stored, in hexadecimal.
     pub sha256: String,
+}
+
+/// How many documents are reports of one command, as one version of scantle makes them.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Serialize, JsonSchema)]
+pub struct Made {
+    /// The command.
+    pub command: String,
+    /// Version of scantle.
+    pub scantle: String,
+    /// Version of the envelope.
+    pub schema: u64,
+    /// The documents.
+    pub documents: u64,
+}
+
+/// Whether a document has the envelope of a report.
+pub fn is_report(document: &Value) -> bool {
+    envelope(document).is_some()
+}
+
+fn envelope(document: &Value) -> Option<(&str, &str, u64)> {
+    let command = document.get("command")?.as_str()?;
+    let scantle = document.get("scantle")?.as_str()?;
+    Some((command, scantle, document.get("schema")?.as_u64()?))
+}
+
+/// The commands and versions that documents are reports of, in alphabetical order; documents that
+/// are no reports are left out. Cost: n log n.
+pub fn made_by(documents: &[Value]) -> Vec<Made> {
+    let mut counts = BTreeMap::new();
+    for made in documents.iter().filter_map(envelope) {
+        *counts.entry(made).or_insert(0) += 1;
+    }
+    let rows = counts.into_iter();
+    rows.map(|((command, scantle, schema), documents)| Made {
+        command: command.to_owned(),
+        scantle: scantle.to_owned(),
+        schema,
+        documents,
+    })
+    .collect()
 }
 
 /// One measure of the error made, or several.
@@ -246,4 +292,30 @@ pub struct Stage {
     pub wall_s: f64,
     /// Processor seconds, all threads together.
     pub cpu_s: f64,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use serde_json::json;
+
+    #[test]
+    fn documents_are_told_to_be_reports_by_their_envelope() {
+        let report = |command| json!({"schema": 1, "scantle": "0.1.0", "command": command});
+        let made = |command: &str, documents| Made {
+            command: command.to_owned(),
+            scantle: "0.1.0".to_owned(),
+            schema: 1,
+            documents,
+        };
+        let others = [
+            json!(null),
+            json!([1]),
+            json!({"schema": 1, "command": "info"}),
+        ];
+        assert!(!others.iter().any(is_report));
+        let mut documents = vec![report("info"), report("compare"), report("info")];
+        documents.extend(others);
+        assert_eq!(made_by(&documents), [made("compare", 1), made("info", 2)]);
+    }
 }

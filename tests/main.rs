@@ -17,6 +17,7 @@ mod malformed;
 mod man;
 mod mutations;
 mod properties;
+mod reports;
 mod trade;
 mod volumes;
 mod voxelize;

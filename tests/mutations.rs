@@ -77,6 +77,12 @@ const WRITTEN: &[(&str, &str)] = &[
         "buffers":[{"byteLength":39,"uri":"data:application/octet-stream;base64,AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAgD8AAAAAAAEC"}]}"#,
     ),
     (
+        "text.json",
+        "{\"schema\": 1, \"scantle\": \"0.1.0\", \"command\": \"info\", \"input\": [\n\
+         {\"path\": \"a/\\u00e9.obj\", \"bytes\": 394}], \"warnings\": [],\n\
+         \"result\": {\"area\": -6.25e-3, \"closed\": true, \"at\": null}}\n{\"b\": [[1], 2]}\n",
+    ),
+    (
         "text.nrrd",
         "NRRD0004\ntype: short\ndimension: 3\nsizes: 2 3 2\nencoding: ascii\n\
          space: left-posterior-superior\nspace directions: (1,0,0) (0,1,0) (0,0,1)\n\

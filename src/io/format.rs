@@ -11,6 +11,8 @@ pub enum Kind {
     Volume,
     /// Pixels.
     Image,
+    /// What commands report, or any other JSON documents.
+    Report,
 }
 
 impl Kind {
@@ -20,6 +22,7 @@ impl Kind {
             Kind::Mesh => "mesh",
             Kind::Volume => "volume",
             Kind::Image => "image",
+            Kind::Report => "report",
         }
     }
 
@@ -29,6 +32,7 @@ impl Kind {
             Kind::Mesh => "a mesh",
             Kind::Volume => "a volume",
             Kind::Image => "an image",
+            Kind::Report => "a report",
         }
     }
 }
@@ -66,6 +70,8 @@ pub enum Format {
     Svo,
     /// Portable Network Graphics.
     Png,
+    /// JSON and JSON Lines.
+    Json,
 }
 
 /// What of a mesh a format can hold beside triangles.
@@ -214,6 +220,13 @@ const TABLE: &[Row] = &[
         (true, false),
         "PNG: grey, colour and palette of up to 16 bits, with or without opacity",
     ),
+    row(
+        Format::Json,
+        &["json", "jsonl"],
+        Kind::Report,
+        (true, false),
+        "JSON and JSON Lines: what every command reports in, and any other documents",
+    ),
 ];
 
 impl Format {
@@ -319,6 +332,9 @@ impl Format {
 }
 
 /// Tells the format by the first bytes, and by the extension where they do not tell.
+///
+/// JSON that its extension does not name is glTF where it has the member `asset` of one. Errors
+/// when neither tells. Cost: linear in the bytes for such JSON, else constant.
 pub fn sniff(bytes: &[u8], extension: Option<&str>) -> Result<Format, Fault> {
     let by_name = extension.and_then(Format::from_extension);
     if bytes.starts_with(b"ply\n") || bytes.starts_with(b"ply\r") {
@@ -358,8 +374,10 @@ pub fn sniff(bytes: &[u8], extension: Option<&str>) -> Result<Format, Fault> {
     if super::off::has_keyword(text) {
         return Ok(Format::Off);
     }
-    if text.starts_with(b"{") {
-        return Ok(Format::Gltf);
+    let text = super::json::unmarked(text);
+    if text.starts_with(b"{") || text.starts_with(b"[") {
+        let is_gltf = super::gltf::is_document(text);
+        return Ok(if is_gltf { Format::Gltf } else { Format::Json });
     }
     let names: Vec<_> = Format::all()
         .filter(|f| f.is_read())
@@ -371,4 +389,33 @@ pub fn sniff(bytes: &[u8], extension: Option<&str>) -> Result<Format, Fault> {
             names.join(", ")
         )),
     )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn json_is_told_from_gltf_by_its_name_and_else_by_what_it_holds() {
+        let gltf = br#"{"asset": {"version": "2.0"}}"#.as_slice();
+        let report = br#" {"schema": 1, "scantle": "0.1.0"}"#.as_slice();
+        let marked = b"\xef\xbb\xbf{}".as_slice();
+        for (bytes, extension, format) in [
+            (gltf, None, Format::Gltf),
+            (gltf, Some("txt"), Format::Gltf),
+            (gltf, Some("gltf"), Format::Gltf),
+            (gltf, Some("JSON"), Format::Json),
+            (report, None, Format::Json),
+            (report, Some("log"), Format::Json),
+            (report, Some("jsonl"), Format::Json),
+            (report, Some("gltf"), Format::Gltf),
+            (b"[1, 2]", None, Format::Json),
+            (b"12", Some("json"), Format::Json),
+            (marked, None, Format::Json),
+            (b"ply\n", Some("json"), Format::Ply),
+        ] {
+            assert_eq!(sniff(bytes, extension), Ok(format), "{extension:?}");
+        }
+        assert!(sniff(b"12", None).is_err());
+    }
 }

@@ -9,6 +9,7 @@ pub mod binvox;
 pub mod format;
 pub mod gltf;
 mod header;
+pub mod json;
 pub mod metaimage;
 pub mod npy;
 pub mod nrrd;
@@ -33,10 +34,11 @@ mod roundtrip;
 use crate::error::{Error, Fault, Result};
 use crate::image::samples::Image;
 use crate::mesh::{Mesh, Polygons};
-use crate::report::{Input, Output, Warning};
+use crate::report::{self, Input, Output, Warning};
 use crate::volume::Volume;
 use crate::volume::bits::BitGrid;
 use format::{Format, Kind};
+use serde_json::Value;
 use sink::Sink;
 use source::Source;
 use std::io::Write;
@@ -50,6 +52,8 @@ pub enum Content {
     Volume(Volume),
     /// Pixels.
     Image(Image),
+    /// JSON documents, in the order of the file.
+    Report(Vec<Value>),
 }
 
 impl Content {
@@ -59,6 +63,7 @@ impl Content {
             Content::Mesh(_) => Kind::Mesh,
             Content::Volume(_) => Kind::Volume,
             Content::Image(_) => Kind::Image,
+            Content::Report(_) => Kind::Report,
         }
     }
 }
@@ -86,6 +91,10 @@ pub fn read(source: &Source, format: Option<Format>) -> Result<(Content, Input, 
         Content::Mesh(mesh) => mesh.content(),
         Content::Volume(volume) => volume.content(),
         Content::Image(image) => image.content(),
+        Content::Report(documents) => report::Content {
+            documents: Some(documents.len() as u64),
+            ..report::Content::default()
+        },
     };
     let input = Input {
         path: source.name().to_owned(),
@@ -110,6 +119,7 @@ fn parse(source: &Source, format: Format, warnings: &mut Vec<Warning>) -> Result
         Format::Binvox => Content::Volume(binvox::read(source, warnings)?),
         Format::Svo => Content::Volume(svo::read(source, warnings)?),
         Format::Png => Content::Image(png::read(source)?),
+        Format::Json => Content::Report(json::read(source, warnings)?),
         Format::Vti | Format::Vdb => {
             return Err(Fault::whole(format!(
                 "{} files are written, not read",
@@ -121,6 +131,7 @@ fn parse(source: &Source, format: Format, warnings: &mut Vec<Warning>) -> Result
         Content::Mesh(mesh) => mesh.check()?,
         Content::Volume(volume) => volume.check()?,
         Content::Image(image) => image.check()?,
+        Content::Report(_) => {}
     }
     Ok(content)
 }
@@ -149,6 +160,17 @@ pub fn read_image(source: &Source, format: Option<Format>) -> Result<(Image, Inp
     match read(source, format)? {
         (Content::Image(image), input, warnings) => Ok((image, input, warnings)),
         (other, input, _) => Err(wrong_kind(source, &input.format, &other, Kind::Image)),
+    }
+}
+
+/// Reads JSON documents; a file of another kind is an error.
+pub fn read_report(
+    source: &Source,
+    format: Option<Format>,
+) -> Result<(Vec<Value>, Input, Vec<Warning>)> {
+    match read(source, format)? {
+        (Content::Report(documents), input, warnings) => Ok((documents, input, warnings)),
+        (other, input, _) => Err(wrong_kind(source, &input.format, &other, Kind::Report)),
     }
 }
 

@@ -60,12 +60,16 @@ pub fn read(source: &Source, _warnings: &mut Vec<Warning>) -> Result<Volume, Fau
         ));
     }
     let dims64: [u64; 3] = std::array::from_fn(|a| word(24 + 8 * a));
+    let [x, y, z] = dims64;
     let wanted = Octree::root_log(dims64.map(|d| usize::try_from(d).unwrap_or(usize::MAX)))
-        .ok_or_else(|| Fault::byte(24, format!("a grid of {dims64:?} voxels is out of range")))?;
+        .ok_or_else(|| {
+            let problem = format!("a grid of {x} x {y} x {z} voxels is out of range");
+            Fault::byte(24, problem)
+        })?;
     if root != wanted {
         return Err(Fault::byte(
             20,
-            format!("the root has edge 2^{root}, but {dims64:?} voxels need 2^{wanted}"),
+            format!("the root has edge 2^{root}, but {x} x {y} x {z} voxels need 2^{wanted}"),
         ));
     }
     let number = |at: usize| f64::from_bits(word(at));

@@ -3,6 +3,7 @@
 mod hausdorff;
 pub mod image_difference;
 pub mod mesh_distance;
+pub mod report_difference;
 pub mod stability;
 mod surface;
 #[cfg(test)]

@@ -208,8 +208,7 @@ fn scale_bar(picture: &mut Picture, pixel: f64, unit: &str) -> f64 {
     if !(pixels.is_finite() && pixels > 0.0) {
         return 0.0;
     }
-    let unit = if unit.is_empty() { "units" } else { unit };
-    let name = format!("{name} {unit}");
+    let name = with_unit(&name, unit);
     let (right, base) = (
         picture.width() as f64 - SIDE,
         (picture.height() - 18) as f64,
@@ -223,6 +222,16 @@ fn scale_bar(picture: &mut Picture, pixel: f64, unit: &str) -> f64 {
     let at = [left - 12.0, base];
     text::draw(picture, &name, at, CAPTION_CAP, Align::Right, INK);
     pixels + wide + 12.0
+}
+
+/// `5 mm`; without a name for the unit `5 units`, and `1 unit`.
+fn with_unit(length: &str, unit: &str) -> String {
+    let unit = match unit {
+        "" if length == "1" => "unit",
+        "" => "units",
+        unit => unit,
+    };
+    format!("{length} {unit}")
 }
 
 /// The largest of 1, 2 and 5 times a power of ten that is not above `most`, and how it is written.
@@ -253,6 +262,14 @@ mod tests {
     use crate::mesh::shapes;
     use crate::volume::bits::BitGrid;
     use crate::volume::{Data, Frame};
+
+    #[test]
+    fn one_unit_is_singular() {
+        assert_eq!(with_unit("1", ""), "1 unit");
+        assert_eq!(with_unit("0.1", ""), "0.1 units");
+        assert_eq!(with_unit("10", ""), "10 units");
+        assert_eq!(with_unit("1", "mm"), "1 mm");
+    }
 
     /// A ball of voxels of edge `h` around the origin.
     fn ball(radius: f64, n: usize) -> Volume {

@@ -8,6 +8,7 @@ mod accessor;
 mod assemble;
 mod document;
 mod scene;
+mod sniff;
 mod write;
 
 use crate::error::Fault;
@@ -15,6 +16,7 @@ use crate::io::source::Source;
 use crate::mesh::Mesh;
 use crate::report::Warning;
 
+pub use sniff::is_document;
 pub use write::write;
 
 /// Reads the default scene (scene 0 where none is named, all root nodes where there is no scene).

@@ -317,7 +317,8 @@ pub fn voxelize(mesh: &Mesh, params: &Params, progress: &dyn Progress) -> Result
         Storage::Sparse => false,
     };
     if dense && bytes > u128::from(params.max_memory) {
-        let what = format!("a dense grid of {:?} voxels", lattice.dims);
+        let [x, y, z] = lattice.dims;
+        let what = format!("a dense grid of {x} x {y} x {z} voxels");
         return Err(Error::over_memory(
             what,
             bytes,

@@ -222,9 +222,10 @@ impl<'a> Surface<'a> {
             })
             .collect();
         if used.into_inner() > limit {
+            let [x, y, z] = self.lattice.dims;
             // How much more it would be depends on when a thread noticed.
             return Err(Error::Limit {
-                what: format!("the sparse grid of {:?} voxels", self.lattice.dims),
+                what: format!("the sparse grid of {x} x {y} x {z} voxels"),
                 needed: format!("more than {limit} bytes"),
                 limit: format!("{limit} bytes"),
                 hint: Some("lower --resolution, or raise --max-memory".to_owned()),
