@@ -75,13 +75,21 @@ fn table(report: &Value) -> Vec<(String, String)> {
 
 /// How far results hold, in a sentence.
 fn reach(result: &Value) -> String {
+    let number = |value: &Value| {
+        value
+            .as_f64()
+            .map_or("none".to_owned(), |n| format!("{n:e}"))
+    };
     let name = |key: &str| result["unchanged"][key].to_string();
+    let offset = number(&result["unchanged"]["offset"]);
+    let drift = match result["drift"].as_f64() {
+        Some(0.0) => "there is no drift".to_owned(),
+        _ => format!("the largest drift is {}", number(&result["drift"])),
+    };
     format!(
-        "No result changes under scales from 2^{} to 2^{} and offsets up to {} extents; the largest drift under all that the command promises to bear is {}.",
+        "No result changes under scales from 2^{} to 2^{} and exact shifts of up to {offset} extents; under all changes that the command promises to bear {drift}.",
         name("smallest_scale"),
         name("largest_scale"),
-        name("offset"),
-        result["drift"]
     )
 }
 
