@@ -80,3 +80,36 @@ fn an_input_is_not_written_over_by_any_name() {
     assert_eq!(fs::read(place.path("cube.obj")).unwrap(), cube);
     assert_eq!(place.names(), ["cube.obj", "other.obj"]);
 }
+
+#[test]
+fn a_pipe_is_written_to_and_stays_a_pipe() {
+    let place = Workplace::new();
+    let line = "mkfifo cube.ply; cat cube.ply > copy.ply & \
+        scantle convert fixtures/shapes/cube.obj -o cube.ply; wait; test -p cube.ply; \
+        scantle convert fixtures/shapes/cube.obj -o plain.ply; cmp copy.ply plain.ply; \
+        scantle convert fixtures/shapes/cube.obj -o >(cat > other.ply) --output-format ply; \
+        wait $!; cmp other.ply plain.ply";
+    let ran = place.shell(line);
+    assert_eq!(ran.code, 0, "{}", ran.stderr);
+    assert_eq!(
+        place.names(),
+        ["copy.ply", "cube.ply", "other.ply", "plain.ply"]
+    );
+}
+
+#[test]
+fn a_link_is_followed_and_stays_a_link() {
+    let place = Workplace::new();
+    fs::create_dir(place.path("far")).unwrap();
+    place.put("far/cube.ply", "old");
+    symlink("far/cube.ply", place.path("cube.ply")).unwrap();
+    let ran = place.run("convert fixtures/shapes/cube.obj -o cube.ply");
+    assert_eq!(ran.code, 0, "{}", ran.stderr);
+    assert!(place.path("cube.ply").is_symlink());
+    assert!(
+        fs::read(place.path("far/cube.ply"))
+            .unwrap()
+            .starts_with(b"ply")
+    );
+    assert_eq!(place.names(), ["cube.ply", "far"]);
+}

@@ -8,6 +8,7 @@ use std::fmt::Write as _;
 use std::fs;
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
+use tempfile::NamedTempFile;
 
 /// A file to be written, or standard output.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -56,7 +57,8 @@ impl Sink {
 
     /// Writes one file whole: nothing is left behind, and nothing is replaced, on failure.
     ///
-    /// The content goes to a new file in the target's folder, is synced and renamed.
+    /// The content goes to a new file in the target's folder, is synced and renamed; a link is
+    /// followed first. What is no file but a pipe or a device is written to as it is.
     pub fn write(
         &self,
         format: Format,
@@ -81,32 +83,19 @@ impl Sink {
                     .map_err(failed)?
                     .1
             }
-            Sink::File(path) => {
-                let folder = path
-                    .parent()
-                    .filter(|p| !p.as_os_str().is_empty())
-                    .unwrap_or(Path::new("."));
-                if path.is_dir() {
-                    return Err(failed(io::Error::new(
-                        io::ErrorKind::IsADirectory,
-                        "is a folder",
-                    )));
-                }
-                let file = tempfile::Builder::new()
-                    .prefix(".scantle-")
-                    .permissions_of_new_files()
-                    .tempfile_in(folder)
-                    .map_err(|e| failed(without_path(&e)))?;
-                let (file, figures) = fill(file, self.is_gzip(), content).map_err(failed)?;
-                if let Ok(old) = fs::metadata(path) {
-                    file.as_file()
-                        .set_permissions(old.permissions())
-                        .map_err(failed)?;
-                }
-                file.as_file().sync_all().map_err(failed)?;
-                file.persist(path).map_err(|e| failed(e.error))?;
-                figures
+            Sink::File(path) => match fs::metadata(path) {
+                Ok(about) if about.is_dir() => Err(io::Error::new(
+                    io::ErrorKind::IsADirectory,
+                    "is a folder",
+                )),
+                Ok(about) if !about.is_file() => fs::OpenOptions::new()
+                    .write(true)
+                    .open(path)
+                    .and_then(|device| fill(device, self.is_gzip(), content))
+                    .map(|(_, figures)| figures),
+                old => replace(path, old.ok(), |file| fill(file, self.is_gzip(), content)),
             }
+            .map_err(failed)?,
         };
         Ok(Output {
             path: self.path().display().to_string(),
@@ -115,6 +104,32 @@ impl Sink {
             sha256,
         })
     }
+}
+
+/// Fills a new file in the folder of `path` and renames it to `path`, with the permissions of the
+/// file that was there.
+fn replace(
+    path: &Path,
+    old: Option<fs::Metadata>,
+    content: impl FnOnce(NamedTempFile) -> io::Result<(NamedTempFile, Figures)>,
+) -> io::Result<Figures> {
+    let target = fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
+    let folder = target
+        .parent()
+        .filter(|p| !p.as_os_str().is_empty())
+        .unwrap_or(Path::new("."));
+    let file = tempfile::Builder::new()
+        .prefix(".scantle-")
+        .permissions_of_new_files()
+        .tempfile_in(folder)
+        .map_err(|e| without_path(&e))?;
+    let (file, figures) = content(file)?;
+    if let Some(old) = old {
+        file.as_file().set_permissions(old.permissions())?;
+    }
+    file.as_file().sync_all()?;
+    file.persist(target).map_err(|e| e.error)?;
+    Ok(figures)
 }
 
 /// An error of a temporary file, without the name of that file: the user never gave it.
