@@ -1,0 +1,308 @@
+//! Rays through the octree.
+
+use super::Octree;
+use crate::volume::trace::{GridRay, Visits};
+
+/// Most levels of nodes: the root of a grid of [`super::MAX_DIM`] voxels down to edge 8.
+const DEPTH: usize = 14;
+
+/// Slices that the profile of a node tells apart.
+const SLICES: usize = 64;
+
+/// The children of a node on the far side of its middle across x, y and z, where child 0 is the one
+/// that the ray comes to first.
+const FAR: [u8; 3] = [0b1010_1010, 0b1100_1100, 0b1111_0000];
+
+/// An octree with what rays through it need beside its nodes.
+#[derive(Debug)]
+pub struct RayTree<'a> {
+    tree: &'a Octree,
+    /// Which slices across z of each node hold a set voxel: one bit per slice of a node of up to 64
+    /// voxels, one per 64th of a larger one.
+    profiles: Vec<Vec<u64>>,
+}
+
+/// A node on the way down, and its children that are still to be visited.
+#[derive(Clone, Copy, Default)]
+struct Frame {
+    node: u32,
+    corner: [u32; 3],
+    /// Children in the order in which the ray comes to them.
+    left: u8,
+}
+
+impl<'a> RayTree<'a> {
+    /// The tree with the profiles of its nodes.
+    ///
+    /// Cost: one pass over the bricks and the nodes; 8 bytes held for each node.
+    pub fn new(tree: &'a Octree) -> Self {
+        let mut profiles: Vec<Vec<u64>> = Vec::with_capacity(tree.levels.len());
+        let mut below: Vec<u64> = tree.bricks.iter().map(|bits| layers(*bits)).collect();
+        let mut edge = 8;
+        for level in tree.levels.iter().rev() {
+            let child_slices = (edge / 2).min(SLICES);
+            let all = u64::MAX >> (SLICES - child_slices);
+            let profile = |node: usize| {
+                let mut next = level.first[node] as usize;
+                let mut halves = [0u64; 2];
+                for child in 0..8 {
+                    if level.mixed[node] >> child & 1 == 1 {
+                        halves[child >> 2] |= below[next];
+                        next += 1;
+                    } else if level.full[node] >> child & 1 == 1 {
+                        halves[child >> 2] |= all;
+                    }
+                }
+                if edge > SLICES {
+                    halves = halves.map(in_pairs);
+                }
+                halves[0] | halves[1] << (edge.min(SLICES) / 2)
+            };
+            below = (0..level.mixed.len()).map(profile).collect();
+            profiles.push(below.clone());
+            edge *= 2;
+        }
+        profiles.reverse();
+        RayTree { tree, profiles }
+    }
+
+    /// Bytes held, those of the octree included.
+    pub fn bytes(&self) -> u64 {
+        let nodes: usize = self.profiles.iter().map(Vec::len).sum();
+        self.tree.bytes() + nodes as u64 * 8
+    }
+
+    /// Whether a ray hits a set voxel, by the rule of [`GridRay::hits`].
+    ///
+    /// With `masked`, a node is left at once when none of its slices between those in which the ray
+    /// enters and leaves it holds anything, and a brick is looked at only where the ray's box is;
+    /// without, only what is empty as a whole is left out. The answer is the same. Cost: the nodes
+    /// on the way, front to back, until one voxel is hit.
+    ///
+    /// Revelles, Ureña and Lastra, "An efficient parametric algorithm for octree traversal" (2000),
+    /// with children that overlap by the rule's slack and without recursion; the mask is that of
+    /// Forest, Barthe and Paulin, "Real-time hierarchical binary-scene voxelization" (2009).
+    pub fn any_hit(&self, ray: &GridRay, masked: bool, visits: &mut Visits) -> bool {
+        let levels = &self.tree.levels;
+        let flip = (0..3).fold(0, |flip, a| flip | usize::from(ray.sign(a) < 0) << a);
+        let mut frames = [Frame::default(); DEPTH];
+        let mut depth = 0;
+        match self.enter(0, Frame::default(), ray, flip, masked, visits) {
+            Entered::Hit => return true,
+            Entered::Left(left) => frames[0].left = left,
+        }
+        loop {
+            let frame = &mut frames[depth];
+            if frame.left == 0 {
+                if depth == 0 {
+                    return false;
+                }
+                depth -= 1;
+                continue;
+            }
+            let child = frame.left.trailing_zeros() as usize ^ flip;
+            frame.left &= frame.left - 1;
+            let level = &levels[depth];
+            let node = frame.node as usize;
+            let before = level.mixed[node] & ((1 << child) - 1);
+            let index = level.first[node] + before.count_ones();
+            let half = (self.tree.root_edge() >> (depth + 1)) as u32;
+            let corner = std::array::from_fn(|a| frame.corner[a] + (child >> a & 1) as u32 * half);
+            if depth + 1 == levels.len() {
+                if self.brick(index as usize, corner, ray, masked, visits) {
+                    return true;
+                }
+                continue;
+            }
+            let below = Frame {
+                node: index,
+                corner,
+                left: 0,
+            };
+            match self.enter(depth + 1, below, ray, flip, masked, visits) {
+                Entered::Hit => return true,
+                Entered::Left(0) => {}
+                Entered::Left(left) => {
+                    depth += 1;
+                    frames[depth] = Frame { left, ..below };
+                }
+            }
+        }
+    }
+
+    /// Which children of a node the ray has to visit, in its order; or that it hits one that is full.
+    #[inline]
+    fn enter(
+        &self,
+        depth: usize,
+        frame: Frame,
+        ray: &GridRay,
+        flip: usize,
+        masked: bool,
+        visits: &mut Visits,
+    ) -> Entered {
+        let level = &self.tree.levels[depth];
+        let node = frame.node as usize;
+        let edge = (self.tree.root_edge() >> depth) as f64;
+        let corner = frame.corner.map(f64::from);
+        let [start, end] = ray.cuboid(corner, [edge; 3]);
+        // Written so that a reach which is no number hits nothing.
+        if start.is_nan() || end.is_nan() || start > end {
+            return Entered::Left(0);
+        }
+        if masked && self.profiles[depth][node] & slices(ray, [start, end], corner[2], edge) == 0 {
+            return Entered::Left(0);
+        }
+        visits.nodes += 1;
+        let half = edge / 2.0;
+        // When the ray leaves the halves it comes to first, and when it enters the others.
+        let mut leave = [0.0; 3];
+        let mut enter = [0.0; 3];
+        for a in 0..3 {
+            let middle = corner[a] + half;
+            let low = ray.slab(a, corner[a], middle);
+            let high = ray.slab(a, middle, middle + half);
+            let (near, far) = if flip >> a & 1 == 1 {
+                (high, low)
+            } else {
+                (low, high)
+            };
+            leave[a] = near[1];
+            enter[a] = far[0];
+        }
+        // A child is met when it is entered, across every axis, before it is left across any.
+        let mut met = u8::MAX;
+        for a in 0..3 {
+            met &= if leave[a] >= start { u8::MAX } else { FAR[a] };
+            met &= if enter[a] <= end { u8::MAX } else { !FAR[a] };
+            for b in 0..3 {
+                if a != b && enter[a] > leave[b] {
+                    met &= !(FAR[a] & !FAR[b]);
+                }
+            }
+        }
+        if met & in_order(level.full[node], flip) != 0 {
+            return Entered::Hit;
+        }
+        Entered::Left(met & in_order(level.mixed[node], flip))
+    }
+
+    /// Whether the ray hits a voxel of a brick.
+    #[inline]
+    fn brick(
+        &self,
+        brick: usize,
+        corner: [u32; 3],
+        ray: &GridRay,
+        masked: bool,
+        visits: &mut Visits,
+    ) -> bool {
+        let bits = self.tree.bricks[brick];
+        let corner = corner.map(f64::from);
+        let [start, end] = ray.cuboid(corner, [4.0; 3]);
+        if start > end {
+            return false;
+        }
+        visits.nodes += 1;
+        let mut slabs = [[[0.0; 2]; 4]; 3];
+        let mut met = [0usize; 3];
+        for a in 0..3 {
+            for i in 0..4 {
+                let lo = corner[a] + i as f64;
+                let [enter, leave] = ray.slab(a, lo, lo + 1.0);
+                slabs[a][i] = [enter, leave];
+                met[a] |= usize::from(enter <= end && leave >= start) << i;
+            }
+        }
+        let mut rest = if masked {
+            bits & ROWS_X[met[0]] & ROWS_Y[met[1]] & ROWS_Z[met[2]]
+        } else {
+            bits
+        };
+        while rest != 0 {
+            let bit = rest.trailing_zeros() as usize;
+            rest &= rest - 1;
+            visits.voxels += 1;
+            let [x, y, z] = [slabs[0][bit & 3], slabs[1][bit >> 2 & 3], slabs[2][bit >> 4]];
+            let first = ray.reach[0].max(x[0]).max(y[0]).max(z[0]);
+            let last = ray.reach[1].min(x[1]).min(y[1]).min(z[1]);
+            if first <= last {
+                return true;
+            }
+        }
+        false
+    }
+}
+
+/// What a ray finds in a node.
+enum Entered {
+    /// A child that is full.
+    Hit,
+    /// The children that it has to visit.
+    Left(u8),
+}
+
+/// The bits of a brick whose x, y or z is among those of a mask of four.
+const ROWS_X: [u64; 16] = rows(0x1111_1111_1111_1111, 1);
+const ROWS_Y: [u64; 16] = rows(0x000f_000f_000f_000f, 4);
+const ROWS_Z: [u64; 16] = rows(0xffff, 16);
+
+const fn rows(first: u64, shift: u32) -> [u64; 16] {
+    let mut table = [0; 16];
+    let mut mask = 0;
+    while mask < 16 {
+        let mut i = 0;
+        while i < 4 {
+            if mask >> i & 1 == 1 {
+                table[mask] |= first << (i * shift);
+            }
+            i += 1;
+        }
+        mask += 1;
+    }
+    table
+}
+
+/// Which layers across z of a brick hold a set voxel.
+fn layers(bits: u64) -> u64 {
+    (0..4).fold(0, |layers, z| {
+        layers | u64::from(bits >> (16 * z) & 0xffff != 0) << z
+    })
+}
+
+/// Bit `i` of the result is the or of bits 2 i and 2 i + 1.
+fn in_pairs(bits: u64) -> u64 {
+    (0..32).fold(0, |pairs, i| {
+        pairs | u64::from(bits >> (2 * i) & 3 != 0) << i
+    })
+}
+
+/// The slices of a node's profile between those in which a ray enters and leaves it, and what those
+/// places may be off by.
+#[inline]
+fn slices(ray: &GridRay, [start, end]: [f64; 2], corner: f64, edge: f64) -> u64 {
+    let count = edge.min(SLICES as f64);
+    let scale = count / edge;
+    let (a, b) = (ray.at(start, 2) - corner, ray.at(end, 2) - corner);
+    let haze = ray.haze();
+    let last = count - 1.0;
+    let low = ((a.min(b) - haze) * scale).clamp(0.0, last) as u32;
+    let high = ((a.max(b) + haze) * scale).clamp(0.0, last) as u32;
+    (u64::MAX << low) & (u64::MAX >> (63 - high))
+}
+
+/// A mask of children in the order in which a ray comes to them: bit `i` is child `i ^ flip`.
+#[inline]
+fn in_order(mask: u8, flip: usize) -> u8 {
+    let mut mask = mask;
+    if flip & 1 != 0 {
+        mask = (mask & 0x55) << 1 | (mask & 0xaa) >> 1;
+    }
+    if flip & 2 != 0 {
+        mask = (mask & 0x33) << 2 | (mask & 0xcc) >> 2;
+    }
+    if flip & 4 != 0 {
+        mask = mask.rotate_left(4);
+    }
+    mask
+}
