@@ -63,11 +63,7 @@ fn convert(job: &mut Job) -> Result<Found<Params, Stats>> {
     match &content {
         io::Content::Mesh(mesh) => job.write_mesh(mesh)?,
         io::Content::Volume(volume) => job.write_volume(volume)?,
-        io::Content::Image(_) => {
-            if let Some(format) = job.output_format() {
-                return Err(io::cannot_hold(format, kind));
-            }
-        }
+        io::Content::Image(image) => job.write_image(image)?,
     }
     let params = Params {
         output_format: job.output_format().map(Format::name),
