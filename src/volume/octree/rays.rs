@@ -1,10 +1,14 @@
 //! Rays through the octree.
 
 use super::Octree;
+use crate::numeric::vector::Vec3;
 use crate::volume::trace::{GridRay, Visits};
 
 /// Most levels of nodes: the root of a grid of [`super::MAX_DIM`] voxels down to edge 8.
 const DEPTH: usize = 14;
+
+/// Levels of the tree of a grid of 512 voxels along a side.
+const SHALLOW: usize = 7;
 
 /// Slices that the profile of a node tells apart.
 const SLICES: usize = 64;
@@ -13,20 +17,50 @@ const SLICES: usize = 64;
 /// that the ray comes to first.
 const FAR: [u8; 3] = [0b1010_1010, 0b1100_1100, 0b1111_0000];
 
-/// An octree with what rays through it need beside its nodes.
+/// An octree laid out for rays.
 #[derive(Debug)]
 pub struct RayTree<'a> {
     tree: &'a Octree,
-    /// Which slices across z of each node hold a set voxel: one bit per slice of a node of up to 64
-    /// voxels, one per 64th of a larger one.
-    profiles: Vec<Vec<u64>>,
+    levels: Vec<Vec<Node>>,
+}
+
+/// A node of the octree, all of it in one place.
+#[derive(Debug, Clone, Copy)]
+struct Node {
+    /// Which slices across z hold a set voxel: one bit per slice of a node of up to 64 voxels, one
+    /// per 64th of a larger one.
+    profile: u64,
+    first: u32,
+    mixed: u8,
+    full: u8,
+}
+
+/// The parameters at which a ray enters and leaves the swollen slabs of a cube.
+#[derive(Debug, Clone, Copy, Default)]
+struct Span {
+    enter: Vec3,
+    leave: Vec3,
+}
+
+impl Span {
+    /// The parameters within reach at which the ray is in the cube.
+    #[inline]
+    fn within(&self, reach: [f64; 2]) -> [f64; 2] {
+        let [x, y, z] = self.enter;
+        let start = reach[0].max(x).max(y).max(z);
+        let [x, y, z] = self.leave;
+        [start, reach[1].min(x).min(y).min(z)]
+    }
 }
 
 /// A node on the way down, and its children that are still to be visited.
 #[derive(Clone, Copy, Default)]
 struct Frame {
     node: u32,
-    corner: [u32; 3],
+    corner: Vec3,
+    span: Span,
+    /// When the ray leaves the halves that it comes to first, and when it enters the others.
+    middle: Span,
     /// Children in the order in which the ray comes to them.
     left: u8,
 }
@@ -34,9 +68,9 @@ struct Frame {
 impl<'a> RayTree<'a> {
     /// The tree with the profiles of its nodes.
     ///
-    /// Cost: one pass over the bricks and the nodes; 8 bytes held for each node.
+    /// Cost: one pass over the bricks and the nodes; 16 bytes held for each node.
     pub fn new(tree: &'a Octree) -> Self {
-        let mut profiles: Vec<Vec<u64>> = Vec::with_capacity(tree.levels.len());
+        let mut levels: Vec<Vec<Node>> = Vec::with_capacity(tree.levels.len());
         let mut below: Vec<u64> = tree.bricks.iter().map(|bits| layers(*bits)).collect();
         let mut edge = 8;
         for level in tree.levels.iter().rev() {
@@ -58,18 +92,25 @@ impl<'a> RayTree<'a> {
                 }
                 halves[0] | halves[1] << (edge.min(SLICES) / 2)
             };
-            below = (0..level.mixed.len()).map(profile).collect();
-            profiles.push(below.clone());
+            let nodes = (0..level.mixed.len()).map(|node| Node {
+                profile: profile(node),
+                first: level.first[node],
+                mixed: level.mixed[node],
+                full: level.full[node],
+            });
+            let nodes: Vec<Node> = nodes.collect();
+            below = nodes.iter().map(|node| node.profile).collect();
+            levels.push(nodes);
             edge *= 2;
         }
-        profiles.reverse();
-        RayTree { tree, profiles }
+        levels.reverse();
+        RayTree { tree, levels }
     }
 
     /// Bytes held, those of the octree included.
     pub fn bytes(&self) -> u64 {
-        let nodes: usize = self.profiles.iter().map(Vec::len).sum();
-        self.tree.bytes() + nodes as u64 * 8
+        let nodes: usize = self.levels.iter().map(Vec::len).sum();
+        self.tree.bytes() + (nodes * size_of::<Node>()) as u64
     }
 
     /// Whether a ray hits a set voxel, by the rule of [`GridRay::hits`].
@@ -83,13 +124,31 @@ impl<'a> RayTree<'a> {
     /// with children that overlap by the rule's slack and without recursion; the mask is that of
     /// Forest, Barthe and Paulin, "Real-time hierarchical binary-scene voxelization" (2009).
     pub fn any_hit(&self, ray: &GridRay, masked: bool, visits: &mut Visits) -> bool {
-        let levels = &self.tree.levels;
+        let dims = self.tree.dims.map(|d| d as f64);
+        let [start, end] = ray.cuboid([0.0; 3], dims);
+        if start.is_nan() || end.is_nan() || start > end {
+            return false;
+        }
+        // Most trees are far from the deepest, and room for one takes time to clear.
+        if self.levels.len() <= SHALLOW {
+            self.descend::<SHALLOW>(ray, masked, visits)
+        } else {
+            self.descend::<DEPTH>(ray, masked, visits)
+        }
+    }
+
+    fn descend<const MOST: usize>(&self, ray: &GridRay, masked: bool, visits: &mut Visits) -> bool {
         let flip = (0..3).fold(0, |flip, a| flip | usize::from(ray.sign(a) < 0) << a);
-        let mut frames = [Frame::default(); DEPTH];
+        let edge = self.tree.root_edge() as f64;
+        let mut frames = [Frame::default(); MOST];
         let mut depth = 0;
-        match self.enter(0, Frame::default(), ray, flip, masked, visits) {
-            Entered::Hit => return true,
-            Entered::Left(left) => frames[0].left = left,
+        for a in 0..3 {
+            let [enter, leave] = ray.slab(a, 0.0, edge);
+            frames[0].span.enter[a] = enter;
+            frames[0].span.leave[a] = leave;
+        }
+        if self.enter(0, &mut frames[0], ray, flip, masked, visits) {
+            return true;
         }
         loop {
             let frame = &mut frames[depth];
@@ -100,76 +159,77 @@ impl<'a> RayTree<'a> {
                 depth -= 1;
                 continue;
             }
-            let child = frame.left.trailing_zeros() as usize ^ flip;
+            let order = frame.left.trailing_zeros() as usize;
             frame.left &= frame.left - 1;
-            let level = &levels[depth];
-            let node = frame.node as usize;
-            let before = level.mixed[node] & ((1 << child) - 1);
-            let index = level.first[node] + before.count_ones();
-            let half = (self.tree.root_edge() >> (depth + 1)) as u32;
-            let corner = std::array::from_fn(|a| frame.corner[a] + (child >> a & 1) as u32 * half);
-            if depth + 1 == levels.len() {
-                if self.brick(index as usize, corner, ray, masked, visits) {
+            let child = order ^ flip;
+            let node = &self.levels[depth][frame.node as usize];
+            let before = node.mixed & ((1 << child) - 1);
+            let index = node.first + before.count_ones();
+            let half = (self.tree.root_edge() >> (depth + 1)) as f64;
+            let mut below = Frame {
+                node: index,
+                ..Frame::default()
+            };
+            for a in 0..3 {
+                let is_far = order >> a & 1 == 1;
+                let (own, middle) = (&frame.span, &frame.middle);
+                let enter = if is_far {
+                    middle.enter[a]
+                } else {
+                    own.enter[a]
+                };
+                let leave = if is_far {
+                    own.leave[a]
+                } else {
+                    middle.leave[a]
+                };
+                below.span.enter[a] = enter;
+                below.span.leave[a] = leave;
+                below.corner[a] = frame.corner[a] + (child >> a & 1) as f64 * half;
+            }
+            if depth + 1 == self.levels.len() {
+                if self.brick(&below, ray, masked, visits) {
                     return true;
                 }
                 continue;
             }
-            let below = Frame {
-                node: index,
-                corner,
-                left: 0,
-            };
-            match self.enter(depth + 1, below, ray, flip, masked, visits) {
-                Entered::Hit => return true,
-                Entered::Left(0) => {}
-                Entered::Left(left) => {
-                    depth += 1;
-                    frames[depth] = Frame { left, ..below };
-                }
+            if self.enter(depth + 1, &mut below, ray, flip, masked, visits) {
+                return true;
+            }
+            if below.left != 0 {
+                depth += 1;
+                frames[depth] = below;
             }
         }
     }
 
-    /// Which children of a node the ray has to visit, in its order; or that it hits one that is full.
+    /// Finds which children of a node the ray has to visit, and whether it hits one that is full.
     #[inline]
     fn enter(
         &self,
         depth: usize,
-        frame: Frame,
+        frame: &mut Frame,
         ray: &GridRay,
         flip: usize,
         masked: bool,
         visits: &mut Visits,
-    ) -> Entered {
-        let level = &self.tree.levels[depth];
-        let node = frame.node as usize;
+    ) -> bool {
+        let node = self.levels[depth][frame.node as usize];
         let edge = (self.tree.root_edge() >> depth) as f64;
-        let corner = frame.corner.map(f64::from);
-        let [start, end] = ray.cuboid(corner, [edge; 3]);
-        // Written so that a reach which is no number hits nothing.
+        let [start, end] = frame.span.within(ray.reach);
         if start.is_nan() || end.is_nan() || start > end {
-            return Entered::Left(0);
+            return false;
         }
-        if masked && self.profiles[depth][node] & slices(ray, [start, end], corner[2], edge) == 0 {
-            return Entered::Left(0);
+        if masked && node.profile & slices(ray, [start, end], frame.corner[2], edge) == 0 {
+            return false;
         }
         visits.nodes += 1;
-        let half = edge / 2.0;
-        // When the ray leaves the halves it comes to first, and when it enters the others.
-        let mut leave = [0.0; 3];
-        let mut enter = [0.0; 3];
         for a in 0..3 {
-            let middle = corner[a] + half;
-            let low = ray.slab(a, corner[a], middle);
-            let high = ray.slab(a, middle, middle + half);
-            let (near, far) = if flip >> a & 1 == 1 {
-                (high, low)
-            } else {
-                (low, high)
-            };
-            leave[a] = near[1];
-            enter[a] = far[0];
+            let [enter, leave] = ray.halves(a, frame.corner[a] + edge / 2.0);
+            frame.middle.enter[a] = enter;
+            frame.middle.leave[a] = leave;
         }
+        let Span { enter, leave } = frame.middle;
         // A child is met when it is entered, across every axis, before it is left across any.
         let mut met = u8::MAX;
         for a in 0..3 {
@@ -181,49 +241,44 @@ impl<'a> RayTree<'a> {
                 }
             }
         }
-        if met & in_order(level.full[node], flip) != 0 {
-            return Entered::Hit;
-        }
-        Entered::Left(met & in_order(level.mixed[node], flip))
+        frame.left = met & in_order(node.mixed, flip);
+        met & in_order(node.full, flip) != 0
     }
 
     /// Whether the ray hits a voxel of a brick.
     #[inline]
-    fn brick(
-        &self,
-        brick: usize,
-        corner: [u32; 3],
-        ray: &GridRay,
-        masked: bool,
-        visits: &mut Visits,
-    ) -> bool {
-        let bits = self.tree.bricks[brick];
-        let corner = corner.map(f64::from);
-        let [start, end] = ray.cuboid(corner, [4.0; 3]);
-        if start > end {
+    fn brick(&self, frame: &Frame, ray: &GridRay, masked: bool, visits: &mut Visits) -> bool {
+        let [start, end] = frame.span.within(ray.reach);
+        if start.is_nan() || end.is_nan() || start > end {
             return false;
         }
         visits.nodes += 1;
+        let mut rest = self.tree.bricks[frame.node as usize];
         let mut slabs = [[[0.0; 2]; 4]; 3];
-        let mut met = [0usize; 3];
         for a in 0..3 {
+            let mut met = 0;
             for i in 0..4 {
-                let lo = corner[a] + i as f64;
+                let lo = frame.corner[a] + i as f64;
                 let [enter, leave] = ray.slab(a, lo, lo + 1.0);
                 slabs[a][i] = [enter, leave];
-                met[a] |= usize::from(enter <= end && leave >= start) << i;
+                met |= usize::from(enter <= end && leave >= start) << i;
+            }
+            if masked {
+                rest &= ROWS[a][met];
+                if rest == 0 {
+                    return false;
+                }
             }
         }
-        let mut rest = if masked {
-            bits & ROWS_X[met[0]] & ROWS_Y[met[1]] & ROWS_Z[met[2]]
-        } else {
-            bits
-        };
         while rest != 0 {
             let bit = rest.trailing_zeros() as usize;
             rest &= rest - 1;
             visits.voxels += 1;
-            let [x, y, z] = [slabs[0][bit & 3], slabs[1][bit >> 2 & 3], slabs[2][bit >> 4]];
+            let [x, y, z] = [
+                slabs[0][bit & 3],
+                slabs[1][bit >> 2 & 3],
+                slabs[2][bit >> 4],
+            ];
             let first = ray.reach[0].max(x[0]).max(y[0]).max(z[0]);
             let last = ray.reach[1].min(x[1]).min(y[1]).min(z[1]);
             if first <= last {
@@ -234,18 +289,12 @@ impl<'a> RayTree<'a> {
     }
 }
 
-/// What a ray finds in a node.
-enum Entered {
-    /// A child that is full.
-    Hit,
-    /// The children that it has to visit.
-    Left(u8),
-}
-
-/// The bits of a brick whose x, y or z is among those of a mask of four.
-const ROWS_X: [u64; 16] = rows(0x1111_1111_1111_1111, 1);
-const ROWS_Y: [u64; 16] = rows(0x000f_000f_000f_000f, 4);
-const ROWS_Z: [u64; 16] = rows(0xffff, 16);
+/// The bits of a brick whose x (or y, or z) is among those of a mask of four.
+const ROWS: [[u64; 16]; 3] = [
+    rows(0x1111_1111_1111_1111, 1),
+    rows(0x000f_000f_000f_000f, 4),
+    rows(0xffff, 16),
+];
 
 const fn rows(first: u64, shift: u32) -> [u64; 16] {
     let mut table = [0; 16];

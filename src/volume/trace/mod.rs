@@ -104,6 +104,29 @@ impl GridRay {
         }
     }
 
+    /// The parameters at which the ray enters the second half that it comes to, of a slab with this
+    /// middle, and at which it leaves the first; as [`GridRay::slab`] of either half has them. A ray
+    /// along the slab comes to the lower half first.
+    #[inline]
+    pub(super) fn halves(&self, axis: usize, middle: f64) -> [f64; 2] {
+        let (o, inverse) = (self.origin[axis], self.inverse[axis]);
+        let (below, above) = (middle - self.slack, middle + self.slack);
+        if inverse > 0.0 {
+            [(below - o) * inverse, (above - o) * inverse]
+        } else if inverse < 0.0 {
+            [(above - o) * inverse, (below - o) * inverse]
+        } else {
+            let never = |met| {
+                if met {
+                    f64::INFINITY
+                } else {
+                    f64::NEG_INFINITY
+                }
+            };
+            [-never(o >= below), never(o <= above)]
+        }
+    }
+
     /// The parameters within reach at which the ray is in the swollen cube from `lo` with this edge;
     /// empty (the first above the second) where it is not.
     #[inline]

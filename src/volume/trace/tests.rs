@@ -134,7 +134,10 @@ fn a_ray_along_an_edge_meets_all_four_voxels_around_it() {
         grid.set(x, y, 7);
         let tree = Octree::from_bits(&grid);
         let mut visits = Visits::default();
-        assert!(RayTree::new(&tree).any_hit(&ray, true, &mut visits), "{x} {y}");
+        assert!(
+            RayTree::new(&tree).any_hit(&ray, true, &mut visits),
+            "{x} {y}"
+        );
         let set = |x, y, z| grid.get(x, y, z);
         assert!(any_set([10; 3], &ray, set, &mut visits), "{x} {y}");
     }
