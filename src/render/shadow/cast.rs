@@ -185,6 +185,12 @@ impl<'a> Caster<'a> {
         }
     }
 
+    /// Bytes that the octree takes with its layout for rays; 0 where there is none.
+    pub fn bytes(&self) -> u64 {
+        let tree = self.grid.as_ref().and_then(|grid| grid.tree.as_ref());
+        tree.map_or(0, RayTree::bytes)
+    }
+
     /// Lights whose centre lies in a voxel that is set.
     pub fn lights_in_voxels(&self) -> report::Tally {
         let mut found = report::Tally::default();

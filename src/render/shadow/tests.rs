@@ -278,6 +278,17 @@ fn what_cannot_be_drawn_is_refused_with_words() {
         why(&cube, dark),
         "--light 0.0,0.0,0.0,-1.0: the radius is negative"
     );
+    let far = Params {
+        lights: vec![Light {
+            centre: [1e200, 0.0, 0.0],
+            radius: 1.0,
+        }],
+        ..Params::DEFAULT
+    };
+    assert_eq!(
+        why(&cube, far),
+        "--light 1e200,0.0,0.0,1.0: is over 1e100 times the model's size away from it"
+    );
     assert_eq!(
         why(&Mesh::default(), Params::DEFAULT),
         "has no triangles, which alone cast and take shadows"
