@@ -198,9 +198,9 @@ impl<'a> Caster<'a> {
             return found;
         };
         for (index, light) in self.lights.iter().enumerate() {
-            let p = grid.lattice.to_grid(light.centre);
-            let inside = (0..3).all(|a| p[a] >= 0.0 && p[a] < grid.lattice.dims[a] as f64);
-            if inside && grid.get(p[0] as usize, p[1] as usize, p[2] as usize) {
+            let centre = grid.lattice.to_grid(light.centre);
+            let point = GridRay::new(centre, [0.0; 3], [0.0; 2]);
+            if grid.walk(&point, &mut Visits::default()) {
                 found.note(index as u64);
             }
         }
