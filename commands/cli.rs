@@ -3,7 +3,8 @@
 use crate::exit::Exit;
 use crate::streams::say;
 use crate::{
-    compare, completions, convert, formats, info, man, schema, stability, tradeoff, voxelize,
+    compare, completions, convert, formats, info, man, schema, shadow, stability, tradeoff,
+    voxelize,
 };
 use clap::error::ErrorKind;
 use clap::{Arg, CommandFactory, FromArgMatches, Parser, Subcommand};
@@ -25,6 +26,7 @@ struct Cli {
 #[derive(Debug, Subcommand)]
 pub enum Command {
     Voxelize(Box<voxelize::Args>),
+    Shadow(Box<shadow::Args>),
     Info(info::Args),
     Compare(compare::Args),
     Convert(convert::Args),
@@ -39,6 +41,7 @@ pub enum Command {
 /// The commands by what goes in and what comes out, as the help shows them.
 const GROUPS: &[(&str, &[&str])] = &[
     ("Mesh to volume", &["voxelize"]),
+    ("Mesh to picture", &["shadow"]),
     ("Any file", &["info", "convert", "compare"]),
     ("Any command", &["tradeoff", "stability"]),
     (

@@ -59,19 +59,17 @@ pub fn run(args: &Args) -> Result<Exit> {
 fn convert(job: &mut Job) -> Result<Found<Params, Stats>> {
     let content = job.read()?;
     let kind = content.kind();
-    if kind == Kind::Report {
-        let fault = Fault::whole("holds a report (json), which is written in no other format");
-        let hint = "scantle info and scantle compare take reports";
-        return Err(Error::Geometry(fault.with_hint(hint)));
+    if kind != Kind::Report {
+        job.expect_output(&[kind])?;
     }
-    job.expect_output(&[kind])?;
     match &content {
         io::Content::Mesh(mesh) => job.write_mesh(mesh)?,
         io::Content::Volume(volume) => job.write_volume(volume)?,
-        io::Content::Image(_) | io::Content::Report(_) => {
-            if let Some(format) = job.output_format() {
-                return Err(io::cannot_hold(format, kind));
-            }
+        io::Content::Image(image) => job.write_image(image)?,
+        io::Content::Report(_) => {
+            let fault = Fault::whole("holds a report (json), which is written in no other format");
+            let hint = "scantle info and scantle compare take reports";
+            return Err(Error::Geometry(fault.with_hint(hint)));
         }
     }
     let params = Params {

@@ -162,9 +162,9 @@ impl<'a> Job<'a> {
     pub fn expect_output(&self, kinds: &[Kind]) -> Result<()> {
         match self.output_format() {
             Some(format) if !kinds.contains(&format.kind()) => {
-                let made: Vec<_> = kinds.iter().map(|kind| kind.name()).collect();
-                let (made, held) = (made.join(" or a "), format.kind().name());
-                let problem = format!("holds a {held}, but a {made} is made here");
+                let made: Vec<_> = kinds.iter().map(|kind| kind.with_article()).collect();
+                let (made, held) = (made.join(" or "), format.kind().with_article());
+                let problem = format!("holds {held}, but {made} is made here");
                 Err(Error::parameter("output-format", format.name(), problem))
             }
             _ => Ok(()),
@@ -251,6 +251,11 @@ impl<'a> Job<'a> {
             }
         }
         self.write_with(|sink, format| io::write_volume(volume, sink, format))
+    }
+
+    /// Writes the result, if the user wants it.
+    pub fn write_image(&mut self, image: &Image) -> Result<()> {
+        self.write_with(|sink, format| Ok((io::write_image(image, sink, format)?, Vec::new())))
     }
 
     fn write_with(

@@ -26,6 +26,7 @@ mod formats;
 mod info;
 mod man;
 mod schema;
+mod shadow;
 mod stability;
 mod tradeoff;
 mod voxelize;
@@ -45,6 +46,7 @@ fn main() -> ExitCode {
 fn run(command: &Command) -> Exit {
     let ended = match command {
         Command::Voxelize(args) => voxelize::run(args),
+        Command::Shadow(args) => shadow::run(args),
         Command::Info(args) => info::run(args),
         Command::Compare(args) => compare::run(args),
         Command::Convert(args) => convert::run(args),

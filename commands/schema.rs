@@ -2,7 +2,7 @@
 
 use crate::exit::Exit;
 use crate::streams::print;
-use crate::{compare, convert, formats, info, stability, tradeoff, voxelize, words};
+use crate::{compare, convert, formats, info, shadow, stability, tradeoff, voxelize, words};
 use clap::builder::PossibleValuesParser;
 use scantle::error::Result;
 use scantle::report::Report;
@@ -33,6 +33,7 @@ const SCHEMAS: &[Row] = &[
     ("convert", || schema_for!(convert::Report)),
     ("formats", || schema_for!(formats::Table)),
     ("info", || schema_for!(info::Report)),
+    ("shadow", || schema_for!(shadow::Report)),
     ("stability", || schema_for!(stability::Report)),
     ("tradeoff", || schema_for!(tradeoff::Report)),
     ("voxelize", || schema_for!(voxelize::Report)),

@@ -16,7 +16,9 @@ use scantle::io::format::Format;
 use scantle::io::sink::Sink;
 use scantle::io::source::Source;
 use scantle::io::{self, Content};
-use scantle::measure::stability::{Changed, Drift, Motion, Step, mesh_drift, steps, volume_drift};
+use scantle::measure::stability::{
+    Changed, Drift, Motion, Step, image_drift, mesh_drift, steps, volume_drift,
+};
 use scantle::measure::tradeoff::Failed;
 use scantle::mesh::Mesh;
 use scantle::progress::Progress;
@@ -124,7 +126,8 @@ pub fn run(args: &Args) -> Result<Exit> {
         recorder.advance(1);
     }
     recorder.finish();
-    let stats = Stats::new(&mesh, untouched.bound, rows);
+    let in_space = !matches!(untouched.content, Content::Image(_));
+    let stats = Stats::new(&mesh, untouched.bound, in_space, rows);
     let table = result::table(&stats);
     if !talk.quiet {
         show(&table.aligned());
@@ -329,6 +332,10 @@ fn drift(reference: &Made, made: &Made, motion: &Motion) -> Result<Drift, Failed
     match (&reference.content, &made.content) {
         (Content::Volume(a), Content::Volume(b)) => Ok(volume_drift(a, b, motion)),
         (Content::Mesh(a), Content::Mesh(b)) => mesh_drift(a, b, motion).map_err(|error| Failed {
+            code: Exit::of(&error) as u8,
+            message: error.to_string(),
+        }),
+        (Content::Image(a), Content::Image(b)) => image_drift(a, b).map_err(|error| Failed {
             code: Exit::of(&error) as u8,
             message: error.to_string(),
         }),

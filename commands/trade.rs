@@ -1,5 +1,6 @@
 //! Which commands trade accuracy for time, and why the others do not.
 
+use scantle::render::shadow;
 use scantle::trade::Trade;
 use scantle::volume::voxelize;
 
@@ -14,6 +15,7 @@ pub enum Declared {
 /// Every command; `tradeoff` and `stability` know no other way to one.
 pub const TABLE: &[(&str, Declared)] = &[
     ("voxelize", Declared::Trade(&voxelize::TRADE)),
+    ("shadow", Declared::Trade(&shadow::TRADE)),
     (
         "compare",
         Declared::None(

@@ -20,13 +20,24 @@ struct Part {
     extremes: &'static str,
 }
 
-const PARTS: &[Part] = &[Part {
-    command: "voxelize",
-    words: "fixtures/shapes/torus-knot.ply",
-    vary: "--vary resolution=16,32,64,128 --vary mode --repeat 5",
-    advice: "Choose `three-axis` where voxels are to lie near the surface: at one resolution it errs least, for it sets no voxel that the surface only grazes. Choose `conservative` where nothing may be missed: it alone has a proven bound, and one step up in resolution buys the difference back.",
-    extremes: "--resolution 48",
-}];
+const PARTS: &[Part] = &[
+    Part {
+        command: "voxelize",
+        words: "fixtures/shapes/torus-knot.ply",
+        vary: "--vary resolution=16,32,64,128 --vary mode --repeat 5",
+        advice: "Choose `three-axis` where voxels are to lie near the surface: at one resolution it errs least, for it sets no voxel that the surface only grazes. Choose `conservative` where nothing may be missed: it alone has a proven bound, and one step up in resolution buys the difference back.",
+        extremes: "--resolution 48",
+    },
+    Part {
+        command: "shadow",
+        words: "fixtures/shapes/torus-knot.ply --size 128x96",
+        vary: "--vary method --vary resolution=32,128,512 --vary rays=1,16 --repeat 3",
+        advice: ADVICE_ON_SHADOW,
+        extremes: "--resolution 48 --rays 4",
+    },
+];
+
+const ADVICE_ON_SHADOW: &str = "Choose `exact` for meshes of this size: its rays cost no more than those through voxels, and what error is left is the noise of few rays, which `--rays` buys down. The octree earns its place against walking the grid: at 512 voxels it answers the same rays, to the bit, in about a quarter of the time, from 1.6 % of the nodes. With conservative voxels neither lets light through; the error is false shadow of about a voxel around the true one.";
 
 const OPENING: &str = "\
 # The trade

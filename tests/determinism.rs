@@ -22,12 +22,24 @@ const CASES: &[(&str, &str, &str)] = &[
         "obj",
         "convert IN -o - --output-format glb",
     ),
+    (
+        "fixtures/shapes/torus.obj",
+        "obj",
+        "shadow IN --size 50x40 --resolution 32 --seed 7 -o - --output-format png",
+    ),
+    (
+        "fixtures/shapes/torus.obj",
+        "obj",
+        "shadow IN --resolution 32 --bake vertices -o - --output-format ply",
+    ),
 ];
 
 /// Command lines whose report is compared.
 const REPORTS: &[&str] = &[
     "info fixtures/shapes/torus.obj",
     "compare fixtures/shapes/cube.obj fixtures/shapes/torus.obj",
+    "shadow fixtures/shapes/torus.obj --size 50x40 --resolution 32 --verify",
+    "shadow fixtures/shapes/torus.obj --size 50x40 --method exact --verify",
 ];
 
 #[test]

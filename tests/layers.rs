@@ -31,7 +31,7 @@ const MAY_USE: &[(&str, &[&str])] = &[
         "render",
         &[
             "camera", "error", "image", "mesh", "numeric", "progress", "report", "spatial",
-            "volume",
+            "trade", "volume",
         ],
     ),
     (

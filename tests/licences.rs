@@ -119,7 +119,9 @@ fn every_dependency_has_an_allowed_licence() {
         .map(|line| line.split_once('\t').expect("licence, then package"))
         .collect();
     for known in ["clap", "rayon", "jsonschema"] {
-        let is_listed = packages.iter().any(|(_, p)| p.split(' ').next() == Some(known));
+        let is_listed = packages
+            .iter()
+            .any(|(_, p)| p.split(' ').next() == Some(known));
         assert!(is_listed, "{known} is not listed in\n{text}");
     }
     let wrong: Vec<String> = packages

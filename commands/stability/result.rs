@@ -94,9 +94,10 @@ pub struct Row {
     exit_code: u8,
     /// Why there are no figures.
     message: Option<String>,
-    /// Largest distance from something in one result to the nearest in the other.
+    /// Largest distance from something in one result to the nearest in the other; for pictures the
+    /// largest difference of a channel, where 1 is full.
     drift: Option<f64>,
-    /// The same over the longest side of the input's box.
+    /// The same over the longest side of the input's box; without meaning for pictures, and null.
     drift_relative: Option<f64>,
     /// Voxels set in one result and not in the other.
     differing_voxels: Option<u64>,
@@ -182,10 +183,10 @@ impl Row {
 }
 
 impl Stats {
-    pub fn new(mesh: &Mesh, bound: Option<f64>, mut rows: Vec<Row>) -> Self {
+    pub fn new(mesh: &Mesh, bound: Option<f64>, in_space: bool, mut rows: Vec<Row>) -> Self {
         let extent = scantle::measure::stability::extent(mesh);
         for row in &mut rows {
-            row.drift_relative = row.drift.map(|drift| drift / extent);
+            row.drift_relative = row.drift.filter(|_| in_space).map(|drift| drift / extent);
         }
         let reach = |most: f64| {
             let tried = rows.iter().filter(|row| row.status != Outcome::Skipped);

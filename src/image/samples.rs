@@ -1,5 +1,7 @@
 //! Images as files hold them: whole numbers of 8 or 16 bits, with or without colour and opacity.
 
+use super::colour::to_srgb;
+use super::raster::Raster;
 use crate::error::Fault;
 use crate::report::Content;
 
@@ -29,6 +31,17 @@ pub enum Samples {
 }
 
 impl Image {
+    /// The nearest bytes on the sRGB curve to some light.
+    pub fn from_light(light: &Raster) -> Image {
+        let bytes = light.pixels().iter().flat_map(|pixel| to_srgb(*pixel));
+        Image {
+            width: light.width(),
+            height: light.height(),
+            channels: 3,
+            samples: Samples::Eight(bytes.collect()),
+        }
+    }
+
     /// Bits of a sample: 8 or 16.
     pub fn bits(&self) -> u32 {
         match self.samples {

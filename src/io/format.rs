@@ -217,7 +217,7 @@ const TABLE: &[Row] = &[
         Format::Png,
         &["png"],
         Kind::Image,
-        (true, false),
+        (true, true),
         "PNG: grey, colour and palette of up to 16 bits, with or without opacity",
     ),
     row(

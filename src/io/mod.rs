@@ -197,6 +197,14 @@ pub fn write_mesh(mesh: &Mesh, sink: &Sink, format: Format) -> Result<(Vec<Outpu
     Ok((vec![output], dropped(mesh, format)))
 }
 
+/// Writes an image. Returns the lines for the report; nothing is lost.
+pub fn write_image(image: &Image, sink: &Sink, format: Format) -> Result<Vec<Output>> {
+    match format {
+        Format::Png => Ok(vec![sink.write(format, |out| png::write(image, out))?]),
+        _ => Err(cannot_hold(format, Kind::Image)),
+    }
+}
+
 /// Writes a volume. MHD writes two files: the header and, beside it, the data.
 ///
 /// Formats that hold bits only take numbers too where all of them are 0 or 1; they then cost a
@@ -267,7 +275,7 @@ fn refusal(volume: &Volume, format: Format) -> Option<String> {
 }
 
 /// The error of a format that a kind of thing cannot be written to.
-pub fn cannot_hold(format: Format, kind: Kind) -> Error {
+fn cannot_hold(format: Format, kind: Kind) -> Error {
     Error::parameter(
         "output-format",
         format.name(),

@@ -3,8 +3,11 @@
 use super::source::Source;
 use crate::error::Fault;
 use crate::image::samples::{Image, Samples};
-use png::{BitDepth, ColorType, Decoder, DecodingError, Limits, Transformations};
-use std::io::Cursor;
+use png::{
+    BitDepth, ColorType, Decoder, DecodingError, DeflateCompression, Encoder, EncodingError,
+    Filter, Limits, Transformations,
+};
+use std::io::{self, Cursor, Write};
 
 /// The first bytes of every PNG file.
 pub(super) const MAGIC: &[u8] = b"\x89PNG\r\n\x1a\n";
@@ -71,6 +74,44 @@ pub fn read(source: &Source) -> Result<Image, Fault> {
         channels,
         samples,
     })
+}
+
+/// Writes an image with its own channels and bits, lossless.
+///
+/// Errs as its target does, and for sides that are 0 or above 2^32 - 1, which the format cannot hold.
+pub fn write(image: &Image, out: &mut dyn Write) -> io::Result<()> {
+    let side = |side: usize| u32::try_from(side).unwrap_or(0);
+    let mut encoder = Encoder::new(out, side(image.width), side(image.height));
+    encoder.set_color(match image.channels {
+        1 => ColorType::Grayscale,
+        2 => ColorType::GrayscaleAlpha,
+        3 => ColorType::Rgb,
+        _ => ColorType::Rgba,
+    });
+    encoder.set_deflate_compression(DeflateCompression::Level(9));
+    encoder.set_filter(Filter::Adaptive);
+    let swapped;
+    let bytes = match &image.samples {
+        Samples::Eight(bytes) => {
+            encoder.set_depth(BitDepth::Eight);
+            bytes
+        }
+        Samples::Sixteen(words) => {
+            encoder.set_depth(BitDepth::Sixteen);
+            swapped = words.iter().flat_map(|w| w.to_be_bytes()).collect();
+            &swapped
+        }
+    };
+    let mut writer = encoder.write_header().map_err(broken)?;
+    writer.write_image_data(bytes).map_err(broken)?;
+    writer.finish().map_err(broken)
+}
+
+fn broken(e: EncodingError) -> io::Error {
+    match e {
+        EncodingError::IoError(error) => error,
+        other => io::Error::new(io::ErrorKind::InvalidInput, other.to_string()),
+    }
 }
 
 fn damaged(e: DecodingError) -> Fault {
@@ -142,6 +183,26 @@ mod tests {
                 panic!("16 bits became 8");
             };
             assert_eq!((words.len(), words[1]), (4 * channels, 0x0304));
+        }
+    }
+
+    #[test]
+    fn what_is_written_is_read_back() {
+        for channels in 1..=4 {
+            let count = 3 * 2 * channels as u16;
+            let eight = (0..count).map(|i| (i * 7) as u8).collect();
+            let sixteen = (0..count).map(|i| i * 2731).collect();
+            for samples in [Samples::Eight(eight), Samples::Sixteen(sixteen)] {
+                let image = Image {
+                    width: 3,
+                    height: 2,
+                    channels,
+                    samples,
+                };
+                let mut bytes = Vec::new();
+                write(&image, &mut bytes).expect("a vector takes all");
+                assert_eq!(decoded(bytes), Ok(image));
+            }
         }
     }
 

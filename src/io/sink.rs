@@ -84,10 +84,9 @@ impl Sink {
                     .1
             }
             Sink::File(path) => match fs::metadata(path) {
-                Ok(about) if about.is_dir() => Err(io::Error::new(
-                    io::ErrorKind::IsADirectory,
-                    "is a folder",
-                )),
+                Ok(about) if about.is_dir() => {
+                    Err(io::Error::new(io::ErrorKind::IsADirectory, "is a folder"))
+                }
                 Ok(about) if !about.is_file() => fs::OpenOptions::new()
                     .write(true)
                     .open(path)

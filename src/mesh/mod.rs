@@ -5,6 +5,7 @@ pub mod identify;
 pub mod polygon;
 pub mod shapes;
 pub mod topology;
+pub mod tracer;
 
 use crate::error::Fault;
 use crate::numeric::vector::Vec3;

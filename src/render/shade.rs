@@ -16,9 +16,9 @@ use rayon::prelude::*;
 const AMBIENT_RADIUS: f32 = 0.5;
 
 /// Light of the lamp, of the sky above and of what the ground gives back.
-const KEY: Linear = [1.02, 0.985, 0.93];
-const SKY: Linear = [0.46, 0.48, 0.51];
-const BOUNCE: Linear = [0.31, 0.30, 0.285];
+pub(super) const KEY: Linear = [1.02, 0.985, 0.93];
+pub(super) const SKY: Linear = [0.46, 0.48, 0.51];
+pub(super) const BOUNCE: Linear = [0.31, 0.30, 0.285];
 
 /// How dark the shadow on the ground is: under the model, and where the lamp is hidden.
 const CONTACT: f32 = 0.62;
@@ -153,14 +153,17 @@ fn material(
         );
         let open = open.max(((open * a + b) * open + d) * open);
         let ambient = mix(BOUNCE[c], SKY[c], above) * open;
-        let light = albedo * (ambient + KEY[c] * facing);
-        // A soft shoulder instead of a hard white.
-        if light < 0.7 {
-            light
-        } else {
-            0.7 + 0.3 * (1.0 - (-(light - 0.7) / 0.3).exp())
-        }
+        shoulder(albedo * (ambient + KEY[c] * facing))
     })
+}
+
+/// Light with a soft shoulder instead of a hard white.
+pub(super) fn shoulder(light: f32) -> f32 {
+    if light < 0.7 {
+        light
+    } else {
+        0.7 + 0.3 * (1.0 - (-(light - 0.7) / 0.3).exp())
+    }
 }
 
 /// How much of a sample an edge of its square covers, 0 to 1.

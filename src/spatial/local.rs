@@ -43,6 +43,11 @@ impl LocalFrame {
         frame
     }
 
+    /// A local length of 1 is `2^exponent` in the model's unit.
+    pub fn exponent(&self) -> i32 {
+        self.exponent
+    }
+
     /// A point of the model in local coordinates.
     #[inline]
     pub fn to_local(&self, p: Vec3) -> Vec3 {

@@ -2,4 +2,5 @@
 
 pub mod aabb;
 pub mod bvh;
+pub mod bvh4;
 pub mod local;

@@ -3,6 +3,7 @@
 pub mod bits;
 pub mod octree;
 pub mod surface;
+pub mod trace;
 pub mod voxelize;
 
 use crate::error::Fault;

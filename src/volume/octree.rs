@@ -3,6 +3,10 @@
 //! The tree is built from tiles of 64^3 voxels in Morton order, each made on its own, so that a
 //! grid is never held densely. A cube whose voxels are all set is one bit in its parent.
 
+mod rays;
+
+pub use rays::RayTree;
+
 use super::bits::{BitGrid, set_run};
 use crate::error::Fault;
 use rayon::prelude::*;

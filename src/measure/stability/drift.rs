@@ -2,7 +2,8 @@
 
 use super::motion::Motion;
 use crate::error::Result;
-use crate::measure::mesh_distance;
+use crate::image::samples::Image;
+use crate::measure::{image_difference, mesh_distance};
 use crate::mesh::Mesh;
 use crate::numeric::vector::{Vec3, add, cross, dot, length, normalize, scale, sub};
 use crate::progress::Silent;
@@ -16,7 +17,7 @@ use rayon::prelude::*;
 /// How far a result drifted. Lengths are in the unit of the untouched input.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Drift {
-    /// Voxels set in one result and not in the other; `None` for meshes.
+    /// Voxels set in one result and not in the other; `None` for meshes and pictures.
     pub differing: Option<u64>,
     /// Largest distance from something in one result to the nearest in the other; `None` where one
     /// of both is empty and the other is not.
@@ -60,6 +61,19 @@ pub fn mesh_drift(reference: &Mesh, changed: &Mesh, motion: &Motion) -> Result<D
     Ok(Drift {
         differing: None,
         distance: Some(difference.hausdorff),
+        place: 0.0,
+    })
+}
+
+/// How far a picture drifted, which is to stay as it is: the largest difference of a channel, where
+/// 1 is full, in place of a distance.
+///
+/// Errs where the pictures are of different sizes. Cost: that of [`image_difference::compare`].
+pub fn image_drift(reference: &Image, changed: &Image) -> Result<Drift> {
+    let difference = image_difference::compare(reference, changed, &Silent)?;
+    Ok(Drift {
+        differing: None,
+        distance: Some(difference.max / 255.0),
         place: 0.0,
     })
 }

@@ -9,7 +9,7 @@ mod drift;
 mod motion;
 
 pub use change::{Changed, Rounding, Step, extent};
-pub use drift::{Drift, mesh_drift, volume_drift};
+pub use drift::{Drift, image_drift, mesh_drift, volume_drift};
 pub use motion::Motion;
 
 use crate::trade::Change;

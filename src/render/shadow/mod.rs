@@ -1,0 +1,337 @@
+//! Soft shadows of area lights: rays through voxels, and exact rays beside them.
+//!
+//! After Forest, Barthe and Paulin (Real-Time Hierarchical Binary-Scene Voxelization, 2009), who
+//! answer shadow rays by an octree of voxels, and never measured what that costs in accuracy.
+//!
+//! A voxel that the surface sets would shade that surface itself. A ray therefore goes by triangles
+//! until it has left the voxels of the surface on which it starts, and by voxels from there: that is
+//! after `(|n_x| + |n_y| + |n_z|) / cos` voxels for a plane of normal n that it leaves at this
+//! angle; one voxel of height is added for surfaces that bend upwards, and the way held between
+//! [`NEAR_LEAST`] and [`NEAR_MOST`]. So in conservative mode no ray can miss a blocker. The paper has no such part; to ignore what is near instead ([`Near::Skip`]) is faster,
+//! and lets light through where things touch.
+
+mod cast;
+mod params;
+mod picture;
+mod stats;
+mod trade;
+
+pub use cast::{NEAR_LEAST, NEAR_MOST};
+pub use params::{Light, MOST_PIXELS, MOST_RAYS, Method, Near, Params, REFERENCE_RAYS, View};
+pub use stats::{Stats, Verified, Voxels};
+pub use trade::TRADE;
+
+use crate::camera::{Camera, Size, THREE_QUARTER};
+use crate::error::{Error, Fault, Result};
+use crate::image::raster::Raster;
+use crate::mesh::Mesh;
+use crate::mesh::tracer::Tracer;
+use crate::numeric::vector::{Vec3, add, cross, normalize, scale, sub};
+use crate::progress::Progress;
+use crate::report::Modelled;
+use crate::spatial::aabb::Aabb;
+use crate::spatial::local::{exponent_above, times_power_of_two};
+use crate::volume::voxelize::{self, Mode, Storage, voxelize};
+use crate::volume::{Data, Volume};
+use cast::{Caster, Tally};
+use rayon::prelude::*;
+
+/// Draws the mesh under its lights, on a white ground that takes its shadow.
+///
+/// Four samples per pixel see the mesh through [`Tracer`]; the shadow rays of a pixel are spread
+/// over them, and end on the disc that each light shows. Where they end depends on the seed and the
+/// pixel alone: equal input gives equal bytes on any number of threads, and a model scaled by a
+/// power of two or moved exactly gives the same picture. Both sides of triangles are alike: a camera
+/// inside the mesh sees its inside, which no light from outside reaches. All lights together are as
+/// bright as one, at any distance.
+///
+/// Errs for parameters out of range, for a mesh without triangles or whose extent overflows, and
+/// where the voxels would not fit in `max_memory`. Cost: building, then four rays and `rays` per
+/// light for each pixel.
+pub fn draw(mesh: &Mesh, params: &Params, progress: &dyn Progress) -> Result<(Raster, Stats)> {
+    let model = Model::new(mesh, params, progress)?;
+    let caster = model.caster(params);
+    let (raster, tally) = picture::draw(&model, &caster, params, progress);
+    let stats = model.stats(params, &caster, tally);
+    Ok((raster, stats))
+}
+
+/// The mesh with the share of the lights that each vertex sees as its colour, from black to white.
+///
+/// Light comes at the angle of the vertex's normal, the mean of those of its triangles weighted by
+/// area: what falls behind it does not count, and of the rest the cosine. Vertices of no triangle
+/// are black. Errs and costs as [`draw`], with vertices for pixels.
+pub fn bake(mesh: &Mesh, params: &Params, progress: &dyn Progress) -> Result<(Mesh, Stats)> {
+    let model = Model::new(mesh, params, progress)?;
+    let caster = model.caster(params);
+    progress.stage("trace", model.mesh.positions.len() as u64);
+    let normals = model.normals();
+    let found: Vec<(f64, Tally)> = (0..normals.len())
+        .into_par_iter()
+        .with_min_len(64)
+        .map(|v| {
+            let mut tally = Tally::default();
+            let start = caster.start(model.mesh.positions[v], normals[v], true);
+            let rays = caster.rays(&[start], v as u64);
+            tally.note(&rays);
+            progress.advance(1);
+            (rays.seen(0), tally)
+        })
+        .collect();
+    let mut baked = mesh.clone();
+    let grey = |light: f64| {
+        let light = light.clamp(0.0, 1.0) as f32;
+        [light, light, light, 1.0]
+    };
+    baked.colors = Some(found.iter().map(|(light, _)| grey(*light)).collect());
+    let tally = found.into_iter().fold(Tally::default(), |mut all, (_, t)| {
+        all.add(&t);
+        all
+    });
+    let stats = model.stats(params, &caster, tally);
+    Ok((baked, stats))
+}
+
+/// The way to coordinates in which the model's box starts at 0 and its longest side is from 1/2 to 1.
+///
+/// The difference from the box's corner moves with the model, and scaling by powers of two is exact:
+/// what is left depends on neither place nor size.
+#[derive(Debug, Clone, Copy)]
+struct Local {
+    origin: Vec3,
+    exponent: i32,
+}
+
+impl Local {
+    fn point(&self, p: Vec3) -> Vec3 {
+        sub(p, self.origin).map(|c| times_power_of_two(c, -self.exponent))
+    }
+
+    fn length(&self, length: f64) -> f64 {
+        times_power_of_two(length, -self.exponent)
+    }
+}
+
+/// The mesh in local coordinates, its triangles laid out for rays, and its voxels.
+struct Model {
+    local: Local,
+    /// Triangles alone; vertices that none uses are put where one is that is used.
+    mesh: Mesh,
+    tracer: Tracer,
+    grid: Option<(Volume, voxelize::Stats)>,
+    lights: Vec<Light>,
+    camera: Camera,
+    up: Vec3,
+}
+
+impl Model {
+    fn new(mesh: &Mesh, params: &Params, progress: &dyn Progress) -> Result<Model> {
+        params.check()?;
+        if mesh.triangles.is_empty() {
+            return Err(Error::Geometry(Fault::whole(
+                "has no triangles, which alone cast and take shadows",
+            )));
+        }
+        progress.stage("layout", 0);
+        let (local, mesh) = localized(mesh)?;
+        let tracer = Tracer::new(&mesh);
+        let grid = match params.method {
+            Method::Exact => None,
+            method => {
+                let asked = voxelize::Params {
+                    size: voxelize::Size::Resolution(params.resolution),
+                    mode: params.mode,
+                    grid: if method == Method::Octree {
+                        Storage::Sparse
+                    } else {
+                        Storage::Auto
+                    },
+                    // A margin would only make the tree's root larger.
+                    pad: 0,
+                    max_memory: params.max_memory,
+                    ..voxelize::Params::DEFAULT
+                };
+                Some(voxelize(&mesh, &asked, progress)?)
+            }
+        };
+        let up = params.camera.map_or([0.0, 1.0, 0.0], |view| view.up);
+        let up = normalize(up);
+        let bounds = mesh.bounds();
+        let direction = params
+            .camera
+            .map_or(THREE_QUARTER, |view| sub(view.eye, view.target));
+        let framing = Camera::framing(&bounds, direction, up, 1.0);
+        let given = params.lights.iter().map(|light| Light {
+            centre: local.point(light.centre),
+            radius: local.length(light.radius),
+        });
+        let mut lights: Vec<Light> = given.collect();
+        for (light, asked) in lights.iter().zip(&params.lights) {
+            if !is_near(light.centre) || !is_near([light.radius; 3]) {
+                return Err(asked.too_far());
+            }
+        }
+        if lights.is_empty() {
+            lights.push(default_light(&framing, bounds, up));
+        }
+        let size = Size {
+            width: params.size[0] as usize,
+            height: params.size[1] as usize,
+        };
+        let camera = match params.camera {
+            Some(view) => {
+                let (eye, target) = (local.point(view.eye), local.point(view.target));
+                if !is_near(eye) || !is_near(target) {
+                    return Err(view.too_far());
+                }
+                Camera::look_at(eye, target, up, view.fov_deg.to_radians())
+            }
+            None => picture::framed(&framing, &mesh, &lights, up, size),
+        };
+        Ok(Model {
+            local,
+            mesh,
+            tracer,
+            grid,
+            lights,
+            camera,
+            up,
+        })
+    }
+
+    fn caster<'a>(&'a self, params: &'a Params) -> Caster<'a> {
+        let grid = self.grid.as_ref();
+        let grid = grid.map(|(volume, made)| (&volume.data, made.lattice()));
+        Caster::new(&self.tracer, grid, &self.lights, params)
+    }
+
+    /// A unit normal for each vertex; 0 where none is known.
+    fn normals(&self) -> Vec<Vec3> {
+        let mut sums = vec![[0.0; 3]; self.mesh.positions.len()];
+        for (t, triangle) in self.mesh.triangles.iter().enumerate() {
+            let [a, b, c] = self.mesh.corners(t);
+            let area = cross(sub(b, a), sub(c, a));
+            for v in triangle {
+                let sum = &mut sums[*v as usize];
+                *sum = add(*sum, area);
+            }
+        }
+        sums.into_iter().map(normalize).collect()
+    }
+
+    fn stats(&self, params: &Params, caster: &Caster, tally: Tally) -> Stats {
+        let world = |p: Vec3| {
+            add(
+                p.map(|c| times_power_of_two(c, self.local.exponent)),
+                self.local.origin,
+            )
+        };
+        let lights: Vec<Light> = if params.lights.is_empty() {
+            let back = |light: &Light| Light {
+                centre: world(light.centre),
+                radius: times_power_of_two(light.radius, self.local.exponent),
+            };
+            self.lights.iter().map(back).collect()
+        } else {
+            params.lights.clone()
+        };
+        let triangles = self.mesh.triangles.len() as u64;
+        let voxels = self.grid.as_ref().map(|(_, made)| Voxels {
+            dims: made.dims,
+            spacing: times_power_of_two(made.spacing[0], self.local.exponent),
+            set_voxels: made.set_voxels,
+            nodes_visited: tally.visits.nodes,
+            voxels_visited: tally.visits.voxels,
+        });
+        let modelled = match (&self.grid, params.method) {
+            (Some((_, made)), Method::Octree) => Modelled {
+                bytes: caster.bytes(),
+                ..made.modelled()
+            },
+            (Some((volume, made)), _) => {
+                let count = volume.frame.len() as u64;
+                let bytes = match &volume.data {
+                    Data::Sparse(tree) => tree.bytes(),
+                    _ => made.dense_bytes,
+                };
+                Modelled::new("voxels", count, count, bytes)
+            }
+            (None, _) => Modelled::new("triangles", triangles, triangles, self.tracer.bytes()),
+        };
+        let mut warnings = Vec::new();
+        caster.lights_in_voxels().warn(
+            "light-in-voxel",
+            "lights whose centre lies in a voxel of the surface, from where no light comes",
+            &mut warnings,
+        );
+        Stats {
+            triangles,
+            lights,
+            shaded: tally.shaded,
+            shadow_rays: tally.rays,
+            blocked_rays: tally.blocked,
+            voxels,
+            verified: params.verify.then(|| tally.verified(params.method)),
+            method: params.method,
+            guarded: params.mode == Mode::Conservative && params.near == Near::Exact,
+            modelled,
+            warnings,
+        }
+    }
+}
+
+/// Whether products of local coordinates like these stay far from overflow.
+fn is_near(p: Vec3) -> bool {
+    p.iter().all(|c| c.abs() < FARTHEST)
+}
+
+/// Lights and cameras may be this far from the model, in its own lengths.
+const FARTHEST: f64 = 1e100;
+
+/// The triangles of a mesh in local coordinates.
+fn localized(mesh: &Mesh) -> Result<(Local, Mesh)> {
+    let mut used = vec![false; mesh.positions.len()];
+    for v in mesh.triangles.iter().flatten() {
+        used[*v as usize] = true;
+    }
+    let of_triangles = mesh.positions.iter().zip(&used);
+    let bounds = Aabb::around(of_triangles.filter(|(_, used)| **used).map(|(p, _)| p));
+    let longest = bounds.extent().into_iter().fold(0.0, f64::max);
+    if !longest.is_finite() {
+        return Err(Error::Geometry(Fault::whole(format!(
+            "the model spans {:?} to {:?}: its extent overflows",
+            bounds.lo, bounds.hi
+        ))));
+    }
+    let local = Local {
+        origin: bounds.lo,
+        exponent: if longest > 0.0 {
+            exponent_above(longest)
+        } else {
+            0
+        },
+    };
+    let first = mesh
+        .triangles
+        .first()
+        .map_or([0.0; 3], |t| mesh.positions[t[0] as usize]);
+    let place = |(p, used): (&Vec3, &bool)| local.point(if *used { *p } else { first });
+    let positions = mesh.positions.iter().zip(&used).map(place).collect();
+    let triangles = mesh.triangles.clone();
+    Ok((local, Mesh::from_triangles(positions, triangles)))
+}
+
+/// The light of no other: to the upper left of the viewer, four radii of the model away.
+fn default_light(framing: &Camera, bounds: Aabb, up: Vec3) -> Light {
+    let right = normalize(cross(up, framing.axes[2]));
+    let front = cross(right, up);
+    let away = add(up, add(scale(right, -0.5), scale(front, 0.3)));
+    let way = 4.0 * framing.unit;
+    Light {
+        centre: add(bounds.centre(), scale(normalize(away), way)),
+        radius: 0.16 * way,
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,241 @@
+//! What is asked for.
+
+use crate::error::{Error, Result};
+use crate::numeric::vector::{cross, length, normalize, sub};
+use crate::volume::voxelize::Mode;
+use schemars::JsonSchema;
+use serde::Serialize;
+
+/// How shadow rays are answered.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Method {
+    /// By the octree of the voxels.
+    Octree,
+    /// Voxel by voxel.
+    Dda,
+    /// By the triangles: the reference.
+    Exact,
+}
+
+impl Method {
+    /// The names of all values.
+    pub const NAMES: &'static [&'static str] = &["octree", "dda", "exact"];
+
+    /// The name of this value.
+    pub fn name(self) -> &'static str {
+        match self {
+            Method::Octree => "octree",
+            Method::Dda => "dda",
+            Method::Exact => "exact",
+        }
+    }
+
+    /// The value of a name.
+    pub fn from_name(name: &str) -> Option<Self> {
+        match name {
+            "octree" => Some(Method::Octree),
+            "dda" => Some(Method::Dda),
+            "exact" => Some(Method::Exact),
+            _ => None,
+        }
+    }
+}
+
+/// What a ray through voxels does before it has left those of the surface it starts on.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Near {
+    /// It goes by the triangles.
+    Exact,
+    /// It passes everything.
+    Skip,
+}
+
+impl Near {
+    /// The names of all values.
+    pub const NAMES: &'static [&'static str] = &["skip", "exact"];
+
+    /// The name of this value.
+    pub fn name(self) -> &'static str {
+        match self {
+            Near::Exact => "exact",
+            Near::Skip => "skip",
+        }
+    }
+
+    /// The value of a name.
+    pub fn from_name(name: &str) -> Option<Self> {
+        match name {
+            "exact" => Some(Near::Exact),
+            "skip" => Some(Near::Skip),
+            _ => None,
+        }
+    }
+}
+
+/// A ball that gives light, in the mesh's unit.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
+pub struct Light {
+    /// Its centre.
+    pub centre: [f64; 3],
+    /// Its radius; 0 is a point, whose shadows are hard.
+    pub radius: f64,
+}
+
+/// Where a picture is taken from.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
+pub struct View {
+    /// Where the viewer is, in the mesh's unit.
+    pub eye: [f64; 3],
+    /// The point in the middle of the picture.
+    pub target: [f64; 3],
+    /// The direction that is up in the picture, and across the ground.
+    pub up: [f64; 3],
+    /// Angle from the bottom of the picture to its top, in degrees.
+    pub fov_deg: f64,
+}
+
+/// What [`super::draw`] and [`super::bake`] are asked for.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct Params {
+    /// How shadow rays are answered.
+    pub method: Method,
+    /// Voxels along the longest side of the model.
+    pub resolution: u32,
+    /// Which voxels the surface sets: `three-axis` or `conservative`.
+    pub mode: Mode,
+    /// What rays through voxels do near the surface they start on.
+    pub near: Near,
+    /// Shadow rays for each pixel, or vertex, and light.
+    pub rays: u32,
+    /// The lights; one to the upper left of the viewer where none is given.
+    pub lights: Vec<Light>,
+    /// The camera; a three-quarter view of the model on its ground, y up, where none is given.
+    pub camera: Option<View>,
+    /// Columns and rows of the picture.
+    pub size: [u32; 2],
+    /// What the places of the rays' ends are drawn from.
+    pub seed: u64,
+    /// Whether errors are measured against exact rays.
+    #[serde(skip)]
+    pub verify: bool,
+    /// Bytes that the voxels may take.
+    #[serde(skip)]
+    pub max_memory: u64,
+}
+
+/// Most pixels along a side of a picture.
+pub const MOST_PIXELS: u32 = 16_384;
+
+/// Most rays for a pixel and a light.
+pub const MOST_RAYS: u32 = 1 << 20;
+
+/// Rays for each pixel and light of the reference against which [`Params::verify`] measures.
+pub const REFERENCE_RAYS: u32 = 64;
+
+impl Params {
+    /// What holds when nothing is said.
+    pub const DEFAULT: Params = Params {
+        method: Method::Octree,
+        resolution: 256,
+        mode: Mode::Conservative,
+        near: Near::Exact,
+        rays: 16,
+        lights: Vec::new(),
+        camera: None,
+        size: [1024, 768],
+        seed: 0,
+        verify: false,
+        max_memory: u64::MAX,
+    };
+
+    /// Errs where a value is out of its range, or a camera looks nowhere.
+    pub fn check(&self) -> Result<()> {
+        let range = |option, value: u32, most: u32| {
+            if (1..=most).contains(&value) {
+                return Ok(());
+            }
+            Err(Error::parameter(
+                option,
+                value,
+                format!("is not in 1..={most}"),
+            ))
+        };
+        range("rays", self.rays, MOST_RAYS)?;
+        range("size", self.size[0], MOST_PIXELS)?;
+        range("size", self.size[1], MOST_PIXELS)?;
+        if !matches!(self.mode, Mode::ThreeAxis | Mode::Conservative) {
+            let problem = "lets light through walls; use three-axis or conservative";
+            return Err(Error::parameter("mode", self.mode.name(), problem));
+        }
+        for light in &self.lights {
+            light.check()?;
+        }
+        self.camera.as_ref().map_or(Ok(()), View::check)
+    }
+}
+
+/// What is said of places that coordinates of the model's size cannot reach.
+const TOO_FAR: &str = "is over 1e100 times the model's size away from it";
+
+impl Light {
+    fn wrong(&self, problem: &str) -> Error {
+        let [x, y, z] = self.centre;
+        let text = format!("{x:?},{y:?},{z:?},{:?}", self.radius);
+        Error::parameter("light", text, problem)
+    }
+
+    pub(super) fn too_far(&self) -> Error {
+        self.wrong(TOO_FAR)
+    }
+
+    fn check(&self) -> Result<()> {
+        let wrong = |problem: &str| Err(self.wrong(problem));
+        if !self.centre.iter().all(|c| c.is_finite()) || !self.radius.is_finite() {
+            return wrong("has a number that is not finite");
+        }
+        if self.radius < 0.0 {
+            return wrong("the radius is negative");
+        }
+        Ok(())
+    }
+}
+
+impl View {
+    fn wrong(&self, problem: &str) -> Error {
+        let numbers = [self.eye, self.target, self.up].concat();
+        let mut words: Vec<String> = numbers.iter().map(|v| format!("{v:?}")).collect();
+        words.push(format!("{:?}", self.fov_deg));
+        Error::parameter("camera", words.join(","), problem)
+    }
+
+    pub(super) fn too_far(&self) -> Error {
+        self.wrong(TOO_FAR)
+    }
+
+    fn check(&self) -> Result<()> {
+        let all = [self.eye, self.target, self.up].concat();
+        let wrong = |problem: &str| Err(self.wrong(problem));
+        if !all.iter().all(|v| v.is_finite()) || !self.fov_deg.is_finite() {
+            return wrong("has a number that is not finite");
+        }
+        let back = sub(self.eye, self.target);
+        if length(back) == 0.0 {
+            return wrong("the eye is the target, so there is no direction to look in");
+        }
+        if !length(back).is_finite() {
+            return wrong("the distance from the eye to the target overflows");
+        }
+        if length(self.up) == 0.0 {
+            return wrong("up has no length");
+        }
+        if length(cross(normalize(self.up), normalize(back))) < 1e-6 {
+            return wrong("up is parallel to the direction of view");
+        }
+        if !(self.fov_deg > 0.0 && self.fov_deg < 170.0) {
+            return wrong("the angle of view is not above 0 and below 170 degrees");
+        }
+        Ok(())
+    }
+}

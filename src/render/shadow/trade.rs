@@ -1,0 +1,49 @@
+//! The trade that shadows are: fewer rays, coarser voxels.
+
+use crate::trade::{Change, Invariance, Knob, Measure, Trade};
+
+/// The measure that compares methods, resolutions and numbers of rays.
+pub(super) const SOFT: Measure = Measure {
+    name: "mean error of the blocked share",
+    unit: "share of the light",
+};
+
+/// What shadows trade for what.
+pub const TRADE: Trade = Trade {
+    knobs: &[
+        Knob {
+            name: "method",
+            ladder: &["octree", "dda", "exact"],
+            numeric: false,
+        },
+        Knob {
+            name: "resolution",
+            ladder: &["32", "64", "128", "256"],
+            numeric: true,
+        },
+        Knob {
+            name: "rays",
+            ladder: &["1", "4", "16", "64"],
+            numeric: true,
+        },
+        Knob {
+            name: "near",
+            ladder: &["skip", "exact"],
+            numeric: false,
+        },
+        Knob {
+            name: "mode",
+            ladder: &["three-axis", "conservative"],
+            numeric: false,
+        },
+    ],
+    error: SOFT,
+    reference: "other rays by watertight triangles",
+    result: "png",
+    lengths: &[],
+    points: &[],
+    invariant: &[
+        Invariance::always(Change::Scale),
+        Invariance::always(Change::Shift),
+    ],
+};
