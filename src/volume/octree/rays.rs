@@ -3,108 +3,101 @@
 use super::Octree;
 use crate::numeric::vector::Vec3;
 use crate::volume::trace::{GridRay, Visits};
+use wide::f32x4;
 
-/// Most levels of nodes: the root of a grid of [`super::MAX_DIM`] voxels down to edge 8.
-const DEPTH: usize = 14;
-
-/// Levels of the tree of a grid of 512 voxels along a side.
-const SHALLOW: usize = 7;
+/// Most levels of nodes: for a grid of [`super::MAX_DIM`] voxels along a side.
+const DEPTH: usize = 8;
 
 /// Slices that the profile of a node tells apart.
 const SLICES: usize = 64;
 
-/// The children of a node on the far side of its middle across x, y and z, where child 0 is the one
-/// that the ray comes to first.
-const FAR: [u8; 3] = [0b1010_1010, 0b1100_1100, 0b1111_0000];
+/// By how much of its edge a child is swollen for the choice of children, at least: far more than
+/// single precision rounds by, far less than what costs time.
+const SWELL: f64 = 1.0 / (1u64 << 12) as f64;
 
-/// An octree laid out for rays.
+/// Directions are held to at least this share of their largest component for the choice of children:
+/// across the largest grid that moves a ray by less than [`SWELL`] of a voxel.
+const LEAST: f64 = 1.0 / (1u64 << 40) as f64;
+
+/// An octree laid out for rays: each node with its grandchildren, two levels in one.
+///
+/// Grandchild `i` of a node of edge `4 e` lies at `e (b0 + 2 b3, b1 + 2 b4, b2 + 2 b5)` from its lower
+/// corner, where `b` are the bits of `i`; those of nodes of edge 16 are bricks.
 #[derive(Debug)]
 pub struct RayTree<'a> {
     tree: &'a Octree,
+    /// Edge of the root in voxels, a power of 4.
+    edge: usize,
     levels: Vec<Vec<Node>>,
 }
 
-/// A node of the octree, all of it in one place.
+/// A node and its grandchildren.
 #[derive(Debug, Clone, Copy)]
 struct Node {
+    /// Which are nodes, or bricks, of their own.
+    mixed: u64,
+    /// Which are all set.
+    full: u64,
     /// Which slices across z hold a set voxel: one bit per slice of a node of up to 64 voxels, one
     /// per 64th of a larger one.
     profile: u64,
+    /// Index of the first in the next level, or among the bricks.
     first: u32,
-    mixed: u8,
-    full: u8,
-}
-
-/// The parameters at which a ray enters and leaves the swollen slabs of a cube.
-#[derive(Debug, Clone, Copy, Default)]
-struct Span {
-    enter: Vec3,
-    leave: Vec3,
-}
-
-impl Span {
-    /// The parameters within reach at which the ray is in the cube.
-    #[inline]
-    fn within(&self, reach: [f64; 2]) -> [f64; 2] {
-        let [x, y, z] = self.enter;
-        let start = reach[0].max(x).max(y).max(z);
-        let [x, y, z] = self.leave;
-        [start, reach[1].min(x).min(y).min(z)]
-    }
-}
-
-/// A node on the way down, and its children that are still to be visited.
-#[derive(Clone, Copy, Default)]
-struct Frame {
-    node: u32,
-    corner: Vec3,
-    span: Span,
-    /// When the ray leaves the halves that it comes to first, and when it enters the others.
-    middle: Span,
-    /// Children in the order in which the ray comes to them.
-    left: u8,
 }
 
 impl<'a> RayTree<'a> {
     /// The tree with the profiles of its nodes.
     ///
-    /// Cost: one pass over the bricks and the nodes; 16 bytes held for each node.
+    /// Cost: one pass over the bricks and the nodes; 32 bytes held for each node of every second level.
     pub fn new(tree: &'a Octree) -> Self {
-        let mut levels: Vec<Vec<Node>> = Vec::with_capacity(tree.levels.len());
+        let mut levels = Vec::with_capacity(DEPTH);
         let mut below: Vec<u64> = tree.bricks.iter().map(|bits| layers(*bits)).collect();
-        let mut edge = 8;
-        for level in tree.levels.iter().rev() {
-            let child_slices = (edge / 2).min(SLICES);
-            let all = u64::MAX >> (SLICES - child_slices);
-            let profile = |node: usize| {
-                let mut next = level.first[node] as usize;
-                let mut halves = [0u64; 2];
-                for child in 0..8 {
-                    if level.mixed[node] >> child & 1 == 1 {
-                        halves[child >> 2] |= below[next];
-                        next += 1;
-                    } else if level.full[node] >> child & 1 == 1 {
-                        halves[child >> 2] |= all;
+        let mut edge = 4;
+        let mut rest = &tree.levels[..];
+        while let [above @ .., lower] = rest {
+            edge *= 4;
+            let child_slices = (edge / 4).min(SLICES);
+            let count = above.last().map_or(1, |upper| upper.mixed.len());
+            let node = |index: usize| {
+                let mut node = match above.last() {
+                    // With an odd number of levels the root has children in one corner.
+                    None => Node {
+                        mixed: u64::from(lower.mixed[0]),
+                        full: u64::from(lower.full[0]),
+                        profile: 0,
+                        first: lower.first[0],
+                    },
+                    Some(upper) => {
+                        let first = upper.first[index] as usize;
+                        let mut node = Node {
+                            mixed: 0,
+                            full: 0,
+                            profile: 0,
+                            first: lower.first.get(first).copied().unwrap_or(0),
+                        };
+                        let mut next = first;
+                        for child in 0..8 {
+                            if upper.mixed[index] >> child & 1 == 1 {
+                                node.mixed |= u64::from(lower.mixed[next]) << (8 * child);
+                                node.full |= u64::from(lower.full[next]) << (8 * child);
+                                next += 1;
+                            } else if upper.full[index] >> child & 1 == 1 {
+                                node.full |= 0xff << (8 * child);
+                            }
+                        }
+                        node
                     }
-                }
-                if edge > SLICES {
-                    halves = halves.map(in_pairs);
-                }
-                halves[0] | halves[1] << (edge.min(SLICES) / 2)
+                };
+                node.profile = profile(&node, &below, child_slices);
+                node
             };
-            let nodes = (0..level.mixed.len()).map(|node| Node {
-                profile: profile(node),
-                first: level.first[node],
-                mixed: level.mixed[node],
-                full: level.full[node],
-            });
-            let nodes: Vec<Node> = nodes.collect();
+            let nodes: Vec<Node> = (0..count).map(node).collect();
             below = nodes.iter().map(|node| node.profile).collect();
             levels.push(nodes);
-            edge *= 2;
+            rest = above.split_last().map_or(&[], |(_, above)| above);
         }
         levels.reverse();
-        RayTree { tree, levels }
+        RayTree { tree, edge, levels }
     }
 
     /// Bytes held, those of the octree included.
@@ -116,171 +109,133 @@ impl<'a> RayTree<'a> {
     /// Whether a ray hits a set voxel, by the rule of [`GridRay::hits`].
     ///
     /// With `masked`, a node is left at once when none of its slices between those in which the ray
-    /// enters and leaves it holds anything, and a brick is looked at only where the ray's box is;
-    /// without, only what is empty as a whole is left out. The answer is the same. Cost: the nodes
-    /// on the way, front to back, until one voxel is hit.
+    /// enters and leaves it holds anything; without, only what is empty as a whole is left out. The
+    /// answer is the same. Cost: the nodes on the way, front to back, until one voxel is hit.
     ///
     /// Revelles, Ureña and Lastra, "An efficient parametric algorithm for octree traversal" (2000),
-    /// with children that overlap by the rule's slack and without recursion; the mask is that of
-    /// Forest, Barthe and Paulin, "Real-time hierarchical binary-scene voxelization" (2009).
+    /// for two levels at once, without recursion; the mask is that of Forest, Barthe and Paulin,
+    /// "Real-time hierarchical binary-scene voxelization" (2009). Children are chosen in single
+    /// precision with room for its rounding, so some that the ray just misses are looked at; voxels
+    /// and full cubes are hit by the rule alone.
     pub fn any_hit(&self, ray: &GridRay, masked: bool, visits: &mut Visits) -> bool {
         let dims = self.tree.dims.map(|d| d as f64);
         let [start, end] = ray.cuboid([0.0; 3], dims);
         if start.is_nan() || end.is_nan() || start > end {
             return false;
         }
-        // Most trees are far from the deepest, and room for one takes time to clear.
-        if self.levels.len() <= SHALLOW {
-            self.descend::<SHALLOW>(ray, masked, visits)
-        } else {
-            self.descend::<DEPTH>(ray, masked, visits)
-        }
-    }
-
-    fn descend<const MOST: usize>(&self, ray: &GridRay, masked: bool, visits: &mut Visits) -> bool {
-        let flip = (0..3).fold(0, |flip, a| flip | usize::from(ray.sign(a) < 0) << a);
-        let edge = self.tree.root_edge() as f64;
-        let mut frames = [Frame::default(); MOST];
+        let (way, length) = Way::new(ray, [start, end], self.edge as f64);
+        let mut frames = [const { None }; DEPTH];
         let mut depth = 0;
-        for a in 0..3 {
-            let [enter, leave] = ray.slab(a, 0.0, edge);
-            frames[0].span.enter[a] = enter;
-            frames[0].span.leave[a] = leave;
-        }
-        if self.enter(0, &mut frames[0], ray, flip, masked, visits) {
-            return true;
-        }
+        frames[0] = self.enter(&way, [0, 0], [0.0; 3], [0.0, length], masked, visits);
         loop {
-            let frame = &mut frames[depth];
-            if frame.left == 0 {
+            let Some(frame) = &mut frames[depth] else {
                 if depth == 0 {
                     return false;
                 }
                 depth -= 1;
                 continue;
-            }
-            let order = frame.left.trailing_zeros() as usize;
-            frame.left &= frame.left - 1;
-            let child = order ^ flip;
-            let node = &self.levels[depth][frame.node as usize];
-            let before = node.mixed & ((1 << child) - 1);
-            let index = node.first + before.count_ones();
-            let half = (self.tree.root_edge() >> (depth + 1)) as f64;
-            let mut below = Frame {
-                node: index,
-                ..Frame::default()
             };
-            for a in 0..3 {
-                let is_far = order >> a & 1 == 1;
-                let (own, middle) = (&frame.span, &frame.middle);
-                let enter = if is_far {
-                    middle.enter[a]
-                } else {
-                    own.enter[a]
-                };
-                let leave = if is_far {
-                    own.leave[a]
-                } else {
-                    middle.leave[a]
-                };
-                below.span.enter[a] = enter;
-                below.span.leave[a] = leave;
-                below.corner[a] = frame.corner[a] + (child >> a & 1) as f64 * half;
-            }
-            if depth + 1 == self.levels.len() {
-                if self.brick(&below, ray, masked, visits) {
-                    return true;
-                }
-                continue;
-            }
-            if self.enter(depth + 1, &mut below, ray, flip, masked, visits) {
+            if frame.full != 0 && self.hits_full(&way, frame, depth) {
                 return true;
             }
-            if below.left != 0 {
+            if frame.mixed == 0 {
+                frames[depth] = None;
+                continue;
+            }
+            let order = frame.mixed.trailing_zeros() as usize;
+            frame.mixed &= frame.mixed - 1;
+            let below = self.levels[depth][frame.node].below(order ^ way.flip);
+            let edge = (self.edge >> (2 * depth + 2)) as f64;
+            let place = places(order);
+            let corner = std::array::from_fn(|a| frame.corner[a] + place[a] as f64 * edge);
+            let span = frame.slabs.within(place);
+            let span = span.map(|t| frame.start + f64::from(t) * edge);
+            if depth + 1 == self.levels.len() {
+                if self.brick(&way, below, corner, span, visits) {
+                    return true;
+                }
+            } else {
+                frames[depth + 1] =
+                    self.enter(&way, [depth + 1, below], corner, span, masked, visits);
                 depth += 1;
-                frames[depth] = below;
             }
         }
     }
 
-    /// Finds which children of a node the ray has to visit, and whether it hits one that is full.
+    /// The children of a node that a ray may meet; none where there is no such child.
     #[inline]
     fn enter(
         &self,
-        depth: usize,
-        frame: &mut Frame,
-        ray: &GridRay,
-        flip: usize,
+        way: &Way,
+        [depth, index]: [usize; 2],
+        corner: Vec3,
+        span: [f64; 2],
         masked: bool,
         visits: &mut Visits,
-    ) -> bool {
-        let node = self.levels[depth][frame.node as usize];
-        let edge = (self.tree.root_edge() >> depth) as f64;
-        let [start, end] = frame.span.within(ray.reach);
-        if start.is_nan() || end.is_nan() || start > end {
-            return false;
-        }
-        if masked && node.profile & slices(ray, [start, end], frame.corner[2], edge) == 0 {
-            return false;
+    ) -> Option<Frame> {
+        let node = &self.levels[depth][index];
+        let edge = (self.edge >> (2 * depth + 2)) as f64;
+        let slabs = Slabs::new(way, corner, edge, span);
+        if masked && node.profile & slabs.slices(way, edge) == 0 {
+            return None;
         }
         visits.nodes += 1;
-        for a in 0..3 {
-            let [enter, leave] = ray.halves(a, frame.corner[a] + edge / 2.0);
-            frame.middle.enter[a] = enter;
-            frame.middle.leave[a] = leave;
+        let met = slabs.met(way, &MORTON);
+        let (mixed, full) = (node.mixed & met, node.full & met);
+        if mixed | full == 0 {
+            return None;
         }
-        let Span { enter, leave } = frame.middle;
-        // A child is met when it is entered, across every axis, before it is left across any.
-        let mut met = u8::MAX;
-        for a in 0..3 {
-            met &= if leave[a] >= start { u8::MAX } else { FAR[a] };
-            met &= if enter[a] <= end { u8::MAX } else { !FAR[a] };
-            for b in 0..3 {
-                if a != b && enter[a] > leave[b] {
-                    met &= !(FAR[a] & !FAR[b]);
-                }
+        Some(Frame {
+            node: index,
+            corner,
+            start: span[0],
+            mixed: in_order(mixed, way.flip),
+            full,
+            slabs,
+        })
+    }
+
+    /// Whether the ray hits a child that is all set; there are none left to ask about.
+    #[cold]
+    fn hits_full(&self, way: &Way, frame: &mut Frame, depth: usize) -> bool {
+        let edge = (self.edge >> (2 * depth + 2)) as f64;
+        let mut rest = std::mem::take(&mut frame.full);
+        while rest != 0 {
+            let place = places(rest.trailing_zeros() as usize ^ way.flip);
+            rest &= rest - 1;
+            let corner = std::array::from_fn(|a| frame.corner[a] + place[a] as f64 * edge);
+            let [first, last] = way.ray.cuboid(way.turned_back(corner, edge), [edge; 3]);
+            if first <= last {
+                return true;
             }
         }
-        frame.left = met & in_order(node.mixed, flip);
-        met & in_order(node.full, flip) != 0
+        false
     }
 
     /// Whether the ray hits a voxel of a brick.
     #[inline]
-    fn brick(&self, frame: &Frame, ray: &GridRay, masked: bool, visits: &mut Visits) -> bool {
-        let [start, end] = frame.span.within(ray.reach);
-        if start.is_nan() || end.is_nan() || start > end {
+    fn brick(
+        &self,
+        way: &Way,
+        index: usize,
+        corner: Vec3,
+        span: [f64; 2],
+        visits: &mut Visits,
+    ) -> bool {
+        visits.nodes += 1;
+        let slabs = Slabs::new(way, corner, 1.0, span);
+        let mut rest = self.tree.bricks[index] & slabs.met(way, &ROWS);
+        if rest == 0 {
             return false;
         }
-        visits.nodes += 1;
-        let mut rest = self.tree.bricks[frame.node as usize];
-        let mut slabs = [[[0.0; 2]; 4]; 3];
-        for a in 0..3 {
-            let mut met = 0;
-            for i in 0..4 {
-                let lo = frame.corner[a] + i as f64;
-                let [enter, leave] = ray.slab(a, lo, lo + 1.0);
-                slabs[a][i] = [enter, leave];
-                met |= usize::from(enter <= end && leave >= start) << i;
-            }
-            if masked {
-                rest &= ROWS[a][met];
-                if rest == 0 {
-                    return false;
-                }
-            }
-        }
+        let corner = way.turned_back(corner, 4.0);
         while rest != 0 {
             let bit = rest.trailing_zeros() as usize;
             rest &= rest - 1;
             visits.voxels += 1;
-            let [x, y, z] = [
-                slabs[0][bit & 3],
-                slabs[1][bit >> 2 & 3],
-                slabs[2][bit >> 4],
-            ];
-            let first = ray.reach[0].max(x[0]).max(y[0]).max(z[0]);
-            let last = ray.reach[1].min(x[1]).min(y[1]).min(z[1]);
+            let voxel = [bit & 3, bit >> 2 & 3, bit >> 4];
+            let voxel = std::array::from_fn(|a| corner[a] + voxel[a] as f64);
+            let [first, last] = way.ray.cuboid(voxel, [1.0; 3]);
             if first <= last {
                 return true;
             }
@@ -289,27 +244,208 @@ impl<'a> RayTree<'a> {
     }
 }
 
-/// The bits of a brick whose x (or y, or z) is among those of a mask of four.
-const ROWS: [[u64; 16]; 3] = [
-    rows(0x1111_1111_1111_1111, 1),
-    rows(0x000f_000f_000f_000f, 4),
-    rows(0xffff, 16),
-];
-
-const fn rows(first: u64, shift: u32) -> [u64; 16] {
-    let mut table = [0; 16];
-    let mut mask = 0;
-    while mask < 16 {
-        let mut i = 0;
-        while i < 4 {
-            if mask >> i & 1 == 1 {
-                table[mask] |= first << (i * shift);
-            }
-            i += 1;
-        }
-        mask += 1;
+impl Node {
+    /// The index of a child in the level below.
+    #[inline]
+    fn below(&self, child: usize) -> usize {
+        let before = self.mixed & ((1 << child) - 1);
+        self.first as usize + before.count_ones() as usize
     }
-    table
+}
+
+/// A node on the way down, and its children that are still to be visited.
+struct Frame {
+    node: usize,
+    corner: Vec3,
+    /// Where the ray enters.
+    start: f64,
+    /// In the order in which the ray comes to them.
+    mixed: u64,
+    full: u64,
+    slabs: Slabs,
+}
+
+/// A ray in the tree, turned so that it goes upwards along all axes, from where it enters the grid; its
+/// longest component is 1, so that its parameter counts voxels.
+struct Way<'a> {
+    ray: &'a GridRay,
+    edge: f64,
+    origin: Vec3,
+    direction: Vec3,
+    inverse: [f32; 3],
+    /// By what children in the order of the ray differ from those of a node.
+    flip: usize,
+    is_turned: [bool; 3],
+    /// What children are swollen by, in voxels.
+    haze: f64,
+}
+
+impl<'a> Way<'a> {
+    /// The ray between two parameters, and its length.
+    #[inline]
+    fn new(ray: &'a GridRay, [start, end]: [f64; 2], edge: f64) -> (Self, f64) {
+        let direction = ray.crossing();
+        let longest = direction.iter().fold(0.0f64, |m, d| m.max(d.abs()));
+        let is_turned = direction.map(|d| d < 0.0);
+        let origin = std::array::from_fn(|a| {
+            let place = if direction[a] == 0.0 {
+                ray.origin[a]
+            } else {
+                ray.at(start, a)
+            };
+            if is_turned[a] { edge - place } else { place }
+        });
+        let (length, direction) = if longest > 0.0 {
+            (
+                (end - start) * longest,
+                direction.map(|d| (d / longest).abs()),
+            )
+        } else {
+            (0.0, [0.0; 3])
+        };
+        let turned = is_turned.map(usize::from);
+        let way = Way {
+            ray,
+            edge,
+            origin,
+            direction,
+            inverse: direction.map(|d| (1.0 / d.max(LEAST)) as f32),
+            flip: turned[0] * 0b001_001 | turned[1] * 0b010_010 | turned[2] * 0b100_100,
+            is_turned,
+            haze: 2.0 * ray.haze(),
+        };
+        (way, length)
+    }
+
+    /// The lower corner, in the grid, of a cube with this lower corner in the turned tree.
+    #[inline]
+    fn turned_back(&self, corner: Vec3, edge: f64) -> Vec3 {
+        std::array::from_fn(|a| {
+            if self.is_turned[a] {
+                self.edge - edge - corner[a]
+            } else {
+                corner[a]
+            }
+        })
+    }
+}
+
+/// When a ray is in the four slabs of a node's children across each axis: parameters counted in their
+/// edge from where it enters the node.
+struct Slabs {
+    enter: [f32x4; 3],
+    leave: [f32x4; 3],
+    /// Where the ray enters, across z, and where it leaves.
+    z: [f32; 2],
+}
+
+impl Slabs {
+    #[inline]
+    fn new(way: &Way, corner: Vec3, edge: f64, [start, end]: [f64; 2]) -> Self {
+        let per_edge = 1.0 / edge;
+        let swell = (SWELL + way.haze * per_edge) as f32;
+        let last = ((end - start) * per_edge) as f32;
+        let index = f32x4::new([0.0, 1.0, 2.0, 3.0]);
+        let place: [f32; 3] = std::array::from_fn(|a| {
+            ((way.origin[a] + start * way.direction[a] - corner[a]) * per_edge) as f32
+        });
+        let planes = |a: usize, moved: f32| {
+            (index + f32x4::splat(moved - place[a])) * f32x4::splat(way.inverse[a])
+        };
+        Slabs {
+            enter: [0, 1, 2].map(|a| planes(a, -swell).fast_max(f32x4::ZERO)),
+            leave: [0, 1, 2].map(|a| planes(a, 1.0 + swell).fast_min(f32x4::splat(last))),
+            z: [place[2], place[2] + last * way.direction[2] as f32],
+        }
+    }
+
+    /// When the ray is in the child at a place.
+    #[inline]
+    fn within(&self, [x, y, z]: [usize; 3]) -> [f32; 2] {
+        let [ex, ey, ez] = self.enter.each_ref().map(f32x4::as_array);
+        let [lx, ly, lz] = self.leave.each_ref().map(f32x4::as_array);
+        [ex[x].max(ey[y]).max(ez[z]), lx[x].min(ly[y]).min(lz[z])]
+    }
+
+    /// The children that the ray meets: a child is met when it is entered, across every axis, before it
+    /// is left across any.
+    #[inline]
+    fn met(&self, way: &Way, rows: &[[[u64; 16]; 3]; 2]) -> u64 {
+        let [_, ey, ez] = self.enter;
+        let [_, ly, lz] = self.leave;
+        let (ex, lx) = (self.enter[0].as_array(), self.leave[0].as_array());
+        let row = |a: usize, met: u32| rows[usize::from(way.is_turned[a])][a][met as usize & 15];
+        let between = |enter: f32x4, leave: f32x4, from: f32, to: f32| {
+            let met = enter.simd_le(f32x4::splat(to)) & leave.simd_ge(f32x4::splat(from));
+            met.to_bitmask()
+        };
+        let mut met = 0;
+        for j in 0..4 {
+            if ex[j] <= lx[j] {
+                let y = row(1, between(ey, ly, ex[j], lx[j]));
+                let z = row(2, between(ez, lz, ex[j], lx[j]));
+                met |= row(0, 1 << j) & y & z;
+            }
+        }
+        if met == 0 {
+            return 0;
+        }
+        let (ey, ly) = (ey.as_array(), ly.as_array());
+        let mut both = 0;
+        for j in 0..4 {
+            if ey[j] <= ly[j] {
+                both |= row(1, 1 << j) & row(2, between(ez, lz, ey[j], ly[j]));
+            }
+        }
+        met & both
+    }
+
+    /// The slices of the node's profile between those in which the ray enters and leaves it.
+    #[inline]
+    fn slices(&self, way: &Way, edge: f64) -> u64 {
+        let count = (4.0 * edge).min(SLICES as f64) as f32;
+        let scale = count / 4.0;
+        let swell = (SWELL + way.haze / edge) as f32;
+        let last = count - 1.0;
+        let low = ((self.z[0] - swell) * scale).clamp(0.0, last) as u32;
+        let high = ((self.z[1] + swell) * scale).clamp(0.0, last) as u32;
+        let (low, high) = if way.is_turned[2] {
+            (last as u32 - high, last as u32 - low)
+        } else {
+            (low, high)
+        };
+        (u64::MAX << low) & (u64::MAX >> (63 - high))
+    }
+}
+
+/// The place of a child among the four along each axis.
+#[inline]
+fn places(child: usize) -> [usize; 3] {
+    [0, 1, 2].map(|a| (child >> a & 1) | (child >> (a + 3) & 1) << 1)
+}
+
+/// The bits of a brick whose x (or y, or z) is among those of a mask of four, and those whose mirror
+/// image is.
+const ROWS: [[[u64; 16]; 3]; 2] = tables([0, 1, 2, 3, 4, 5]);
+
+/// The same of a node's children.
+const MORTON: [[[u64; 16]; 3]; 2] = tables([0, 3, 1, 4, 2, 5]);
+
+/// With the lower and the upper bit of x, of y and of z at these bits of an index.
+const fn tables(bits: [u32; 6]) -> [[[u64; 16]; 3]; 2] {
+    let mut tables = [[[0; 16]; 3]; 2];
+    let mut entry = 0;
+    while entry < 2 * 3 * 16 * 64 {
+        let (turned, a) = (entry / (3 * 16 * 64), entry / (16 * 64) % 3);
+        let (mask, index) = (entry / 64 % 16, entry % 64);
+        let place = (index >> bits[2 * a] & 1) | (index >> bits[2 * a + 1] & 1) << 1;
+        let place = if turned == 1 { 3 - place } else { place };
+        if mask >> place & 1 == 1 {
+            tables[turned][a][mask] |= 1 << index;
+        }
+        entry += 1;
+    }
+    tables
 }
 
 /// Which layers across z of a brick hold a set voxel.
@@ -319,6 +455,28 @@ fn layers(bits: u64) -> u64 {
     })
 }
 
+/// The profile of a node by those of its children, each of `slices` slices.
+fn profile(node: &Node, below: &[u64], slices: usize) -> u64 {
+    let all = u64::MAX >> (SLICES - slices);
+    let mut quarters = [0u64; 4];
+    let mut next = node.first as usize;
+    for child in 0..64 {
+        let quarter = &mut quarters[places(child)[2]];
+        if node.mixed >> child & 1 == 1 {
+            *quarter |= below[next];
+            next += 1;
+        } else if node.full >> child & 1 == 1 {
+            *quarter |= all;
+        }
+    }
+    let mut slices = slices;
+    while 4 * slices > SLICES {
+        quarters = quarters.map(in_pairs);
+        slices /= 2;
+    }
+    (0..4).fold(0, |all, z| all | quarters[z] << (z * slices))
+}
+
 /// Bit `i` of the result is the or of bits 2 i and 2 i + 1.
 fn in_pairs(bits: u64) -> u64 {
     (0..32).fold(0, |pairs, i| {
@@ -326,32 +484,22 @@ fn in_pairs(bits: u64) -> u64 {
     })
 }
 
-/// The slices of a node's profile between those in which a ray enters and leaves it, and what those
-/// places may be off by.
-#[inline]
-fn slices(ray: &GridRay, [start, end]: [f64; 2], corner: f64, edge: f64) -> u64 {
-    let count = edge.min(SLICES as f64);
-    let scale = count / edge;
-    let (a, b) = (ray.at(start, 2) - corner, ray.at(end, 2) - corner);
-    let haze = ray.haze();
-    let last = count - 1.0;
-    let low = ((a.min(b) - haze) * scale).clamp(0.0, last) as u32;
-    let high = ((a.max(b) + haze) * scale).clamp(0.0, last) as u32;
-    (u64::MAX << low) & (u64::MAX >> (63 - high))
-}
-
 /// A mask of children in the order in which a ray comes to them: bit `i` is child `i ^ flip`.
 #[inline]
-fn in_order(mask: u8, flip: usize) -> u8 {
+fn in_order(mask: u64, flip: usize) -> u64 {
+    const LOWER: [u64; 6] = [
+        0x5555_5555_5555_5555,
+        0x3333_3333_3333_3333,
+        0x0f0f_0f0f_0f0f_0f0f,
+        0x00ff_00ff_00ff_00ff,
+        0x0000_ffff_0000_ffff,
+        0x0000_0000_ffff_ffff,
+    ];
     let mut mask = mask;
-    if flip & 1 != 0 {
-        mask = (mask & 0x55) << 1 | (mask & 0xaa) >> 1;
-    }
-    if flip & 2 != 0 {
-        mask = (mask & 0x33) << 2 | (mask & 0xcc) >> 2;
-    }
-    if flip & 4 != 0 {
-        mask = mask.rotate_left(4);
+    for (bit, lower) in LOWER.iter().enumerate() {
+        if flip >> bit & 1 == 1 {
+            mask = (mask & lower) << (1 << bit) | (mask >> (1 << bit)) & lower;
+        }
     }
     mask
 }

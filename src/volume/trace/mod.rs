@@ -81,6 +81,13 @@ impl GridRay {
         self.slack * 64.0
     }
 
+    /// The direction, 0 across the planes that it never crosses.
+    #[inline]
+    pub(super) fn crossing(&self) -> Vec3 {
+        let known = |a: usize| self.inverse[a] != 0.0;
+        std::array::from_fn(|a| if known(a) { self.direction[a] } else { 0.0 })
+    }
+
     /// Whether planes across an axis are crossed upwards (1), downwards (-1) or never (0).
     #[inline]
     pub(super) fn sign(&self, axis: usize) -> i32 {
@@ -101,29 +108,6 @@ impl GridRay {
             [f64::NEG_INFINITY, f64::INFINITY]
         } else {
             [f64::INFINITY, f64::NEG_INFINITY]
-        }
-    }
-
-    /// The parameters at which the ray enters the second half that it comes to, of a slab with this
-    /// middle, and at which it leaves the first; as [`GridRay::slab`] of either half has them. A ray
-    /// along the slab comes to the lower half first.
-    #[inline]
-    pub(super) fn halves(&self, axis: usize, middle: f64) -> [f64; 2] {
-        let (o, inverse) = (self.origin[axis], self.inverse[axis]);
-        let (below, above) = (middle - self.slack, middle + self.slack);
-        if inverse > 0.0 {
-            [(below - o) * inverse, (above - o) * inverse]
-        } else if inverse < 0.0 {
-            [(above - o) * inverse, (below - o) * inverse]
-        } else {
-            let never = |met| {
-                if met {
-                    f64::INFINITY
-                } else {
-                    f64::NEG_INFINITY
-                }
-            };
-            [-never(o >= below), never(o <= above)]
         }
     }
 
