@@ -29,6 +29,8 @@ pub struct RayTree<'a> {
     /// Edge of the root in voxels, a power of 4.
     edge: usize,
     levels: Vec<Vec<Node>>,
+    /// One over the edge of the children of each level.
+    per_edge: Vec<f64>,
 }
 
 /// A node and its grandchildren.
@@ -97,7 +99,15 @@ impl<'a> RayTree<'a> {
             rest = above.split_last().map_or(&[], |(_, above)| above);
         }
         levels.reverse();
-        RayTree { tree, edge, levels }
+        let per_edge = (0..levels.len())
+            .map(|depth| 1.0 / (edge >> (2 * depth + 2)) as f64)
+            .collect();
+        RayTree {
+            tree,
+            edge,
+            levels,
+            per_edge,
+        }
     }
 
     /// Bytes held, those of the octree included.
@@ -123,87 +133,59 @@ impl<'a> RayTree<'a> {
         if start.is_nan() || end.is_nan() || start > end {
             return false;
         }
-        let (way, length) = Way::new(ray, [start, end], self.edge as f64);
-        let mut frames = [const { None }; DEPTH];
-        let mut depth = 0;
-        frames[0] = self.enter(&way, [0, 0], [0.0; 3], [0.0, length], masked, visits);
-        loop {
-            let Some(frame) = &mut frames[depth] else {
-                if depth == 0 {
-                    return false;
-                }
-                depth -= 1;
-                continue;
-            };
-            if frame.full != 0 && self.hits_full(&way, frame, depth) {
-                return true;
-            }
-            if frame.mixed == 0 {
-                frames[depth] = None;
-                continue;
-            }
-            let order = frame.mixed.trailing_zeros() as usize;
-            frame.mixed &= frame.mixed - 1;
-            let below = self.levels[depth][frame.node].below(order ^ way.flip);
-            let edge = (self.edge >> (2 * depth + 2)) as f64;
-            let place = places(order);
-            let corner = std::array::from_fn(|a| frame.corner[a] + place[a] as f64 * edge);
-            let span = frame.slabs.within(place);
-            let span = span.map(|t| frame.start + f64::from(t) * edge);
-            if depth + 1 == self.levels.len() {
-                if self.brick(&way, below, corner, span, visits) {
-                    return true;
-                }
-            } else {
-                frames[depth + 1] =
-                    self.enter(&way, [depth + 1, below], corner, span, masked, visits);
-                depth += 1;
-            }
-        }
+        let (way, length) = Way::new(ray, [start, end], self.edge as f64, masked);
+        self.enter(&way, [0, 0], [0.0; 3], [0.0, length], visits)
     }
 
-    /// The children of a node that a ray may meet; none where there is no such child.
-    #[inline]
+    /// Whether the ray hits a voxel of a node, which it is in between two parameters.
     fn enter(
         &self,
         way: &Way,
         [depth, index]: [usize; 2],
         corner: Vec3,
         span: [f64; 2],
-        masked: bool,
         visits: &mut Visits,
-    ) -> Option<Frame> {
+    ) -> bool {
         let node = &self.levels[depth][index];
         let edge = (self.edge >> (2 * depth + 2)) as f64;
-        let slabs = Slabs::new(way, corner, edge, span);
-        if masked && node.profile & slabs.slices(way, edge) == 0 {
-            return None;
+        let slabs = Slabs::new(way, corner, self.per_edge[depth], span);
+        if way.masked && node.profile & slabs.slices(way, edge) == 0 {
+            return false;
         }
         visits.nodes += 1;
-        let met = slabs.met(way, &MORTON);
-        let (mixed, full) = (node.mixed & met, node.full & met);
-        if mixed | full == 0 {
-            return None;
+        let met = slabs.met(&way.children, node.mixed | node.full);
+        if met & node.full != 0 && self.hits_full(way, met & node.full, corner, edge) {
+            return true;
         }
-        Some(Frame {
-            node: index,
-            corner,
-            start: span[0],
-            mixed: in_order(mixed, way.flip),
-            full,
-            slabs,
-        })
+        let mut rest = in_order(met & node.mixed, way.flip);
+        while rest != 0 {
+            let order = rest.trailing_zeros() as usize;
+            rest &= rest - 1;
+            let below = node.below(order ^ way.flip);
+            let place = places(order);
+            let corner = std::array::from_fn(|a| corner[a] + place[a] as f64 * edge);
+            let within = slabs.within(place);
+            let span = within.map(|t| span[0] + f64::from(t) * edge);
+            let hits = if depth + 1 == self.levels.len() {
+                self.brick(way, below, corner, span, visits)
+            } else {
+                self.enter(way, [depth + 1, below], corner, span, visits)
+            };
+            if hits {
+                return true;
+            }
+        }
+        false
     }
 
-    /// Whether the ray hits a child that is all set; there are none left to ask about.
+    /// Whether the ray hits one of the children of a mask, which are all set.
     #[cold]
-    fn hits_full(&self, way: &Way, frame: &mut Frame, depth: usize) -> bool {
-        let edge = (self.edge >> (2 * depth + 2)) as f64;
-        let mut rest = std::mem::take(&mut frame.full);
+    fn hits_full(&self, way: &Way, full: u64, corner: Vec3, edge: f64) -> bool {
+        let mut rest = full;
         while rest != 0 {
             let place = places(rest.trailing_zeros() as usize ^ way.flip);
             rest &= rest - 1;
-            let corner = std::array::from_fn(|a| frame.corner[a] + place[a] as f64 * edge);
+            let corner = std::array::from_fn(|a| corner[a] + place[a] as f64 * edge);
             let [first, last] = way.ray.cuboid(way.turned_back(corner, edge), [edge; 3]);
             if first <= last {
                 return true;
@@ -224,7 +206,8 @@ impl<'a> RayTree<'a> {
     ) -> bool {
         visits.nodes += 1;
         let slabs = Slabs::new(way, corner, 1.0, span);
-        let mut rest = self.tree.bricks[index] & slabs.met(way, &ROWS);
+        let bits = self.tree.bricks[index];
+        let mut rest = bits & slabs.met(&way.voxels, bits);
         if rest == 0 {
             return false;
         }
@@ -253,18 +236,6 @@ impl Node {
     }
 }
 
-/// A node on the way down, and its children that are still to be visited.
-struct Frame {
-    node: usize,
-    corner: Vec3,
-    /// Where the ray enters.
-    start: f64,
-    /// In the order in which the ray comes to them.
-    mixed: u64,
-    full: u64,
-    slabs: Slabs,
-}
-
 /// A ray in the tree, turned so that it goes upwards along all axes, from where it enters the grid; its
 /// longest component is 1, so that its parameter counts voxels.
 struct Way<'a> {
@@ -276,6 +247,11 @@ struct Way<'a> {
     /// By what children in the order of the ray differ from those of a node.
     flip: usize,
     is_turned: [bool; 3],
+    /// The children of a node, and the voxels of a brick, by their place in the order of the ray.
+    children: [&'static Rows; 3],
+    voxels: [&'static Rows; 3],
+    /// Whether the profiles of nodes are asked.
+    masked: bool,
     /// What children are swollen by, in voxels.
     haze: f64,
 }
@@ -283,7 +259,7 @@ struct Way<'a> {
 impl<'a> Way<'a> {
     /// The ray between two parameters, and its length.
     #[inline]
-    fn new(ray: &'a GridRay, [start, end]: [f64; 2], edge: f64) -> (Self, f64) {
+    fn new(ray: &'a GridRay, [start, end]: [f64; 2], edge: f64, masked: bool) -> (Self, f64) {
         let direction = ray.crossing();
         let longest = direction.iter().fold(0.0f64, |m, d| m.max(d.abs()));
         let is_turned = direction.map(|d| d < 0.0);
@@ -295,9 +271,10 @@ impl<'a> Way<'a> {
             };
             if is_turned[a] { edge - place } else { place }
         });
+        // No way through the root is longer; parameters may overflow.
         let (length, direction) = if longest > 0.0 {
             (
-                (end - start) * longest,
+                ((end - start) * longest).min(2.0 * edge),
                 direction.map(|d| (d / longest).abs()),
             )
         } else {
@@ -312,6 +289,9 @@ impl<'a> Way<'a> {
             inverse: direction.map(|d| (1.0 / d.max(LEAST)) as f32),
             flip: turned[0] * 0b001_001 | turned[1] * 0b010_010 | turned[2] * 0b100_100,
             is_turned,
+            children: [0, 1, 2].map(|a| &MORTON[turned[a]][a]),
+            voxels: [0, 1, 2].map(|a| &ROWS[turned[a]][a]),
+            masked,
             haze: 2.0 * ray.haze(),
         };
         (way, length)
@@ -335,14 +315,13 @@ impl<'a> Way<'a> {
 struct Slabs {
     enter: [f32x4; 3],
     leave: [f32x4; 3],
-    /// Where the ray enters, across z, and where it leaves.
+    /// Where the ray enters, across z, and where it leaves, at most.
     z: [f32; 2],
 }
 
 impl Slabs {
     #[inline]
-    fn new(way: &Way, corner: Vec3, edge: f64, [start, end]: [f64; 2]) -> Self {
-        let per_edge = 1.0 / edge;
+    fn new(way: &Way, corner: Vec3, per_edge: f64, [start, end]: [f64; 2]) -> Self {
         let swell = (SWELL + way.haze * per_edge) as f32;
         let last = ((end - start) * per_edge) as f32;
         let index = f32x4::new([0.0, 1.0, 2.0, 3.0]);
@@ -355,7 +334,10 @@ impl Slabs {
         Slabs {
             enter: [0, 1, 2].map(|a| planes(a, -swell).fast_max(f32x4::ZERO)),
             leave: [0, 1, 2].map(|a| planes(a, 1.0 + swell).fast_min(f32x4::splat(last))),
-            z: [place[2], place[2] + last * way.direction[2] as f32],
+            z: [
+                place[2] - swell,
+                place[2] + last * way.direction[2] as f32 + swell,
+            ],
         }
     }
 
@@ -364,37 +346,45 @@ impl Slabs {
     fn within(&self, [x, y, z]: [usize; 3]) -> [f32; 2] {
         let [ex, ey, ez] = self.enter.each_ref().map(f32x4::as_array);
         let [lx, ly, lz] = self.leave.each_ref().map(f32x4::as_array);
-        [ex[x].max(ey[y]).max(ez[z]), lx[x].min(ly[y]).min(lz[z])]
+        // Without the care for what is no number that f32::max takes.
+        let greater = |a: f32, b: f32| if a > b { a } else { b };
+        let less = |a: f32, b: f32| if a < b { a } else { b };
+        [
+            greater(ex[x], greater(ey[y], ez[z])),
+            less(lx[x], less(ly[y], lz[z])),
+        ]
     }
 
-    /// The children that the ray meets: a child is met when it is entered, across every axis, before it
-    /// is left across any.
+    /// The children among `asked` that the ray meets, and maybe others: a child is met when it is
+    /// entered, across every axis, before it is left across any.
     #[inline]
-    fn met(&self, way: &Way, rows: &[[[u64; 16]; 3]; 2]) -> u64 {
+    fn met(&self, rows: &[&Rows; 3], asked: u64) -> u64 {
         let [_, ey, ez] = self.enter;
         let [_, ly, lz] = self.leave;
-        let (ex, lx) = (self.enter[0].as_array(), self.leave[0].as_array());
-        let row = |a: usize, met: u32| rows[usize::from(way.is_turned[a])][a][met as usize & 15];
+        let row = |a: usize, met: u32| rows[a][met as usize & 15];
         let between = |enter: f32x4, leave: f32x4, from: f32, to: f32| {
             let met = enter.simd_le(f32x4::splat(to)) & leave.simd_ge(f32x4::splat(from));
             met.to_bitmask()
         };
         let mut met = 0;
+        let (enter, leave) = (self.enter[0].as_array(), self.leave[0].as_array());
         for j in 0..4 {
-            if ex[j] <= lx[j] {
-                let y = row(1, between(ey, ly, ex[j], lx[j]));
-                let z = row(2, between(ez, lz, ex[j], lx[j]));
+            let [enter, leave] = [enter[j], leave[j]];
+            if enter <= leave {
+                let y = row(1, between(ey, ly, enter, leave));
+                let z = row(2, between(ez, lz, enter, leave));
                 met |= row(0, 1 << j) & y & z;
             }
         }
-        if met == 0 {
+        if met & asked == 0 {
             return 0;
         }
-        let (ey, ly) = (ey.as_array(), ly.as_array());
         let mut both = 0;
+        let (enter, leave) = (ey.as_array(), ly.as_array());
         for j in 0..4 {
-            if ey[j] <= ly[j] {
-                both |= row(1, 1 << j) & row(2, between(ez, lz, ey[j], ly[j]));
+            let [enter, leave] = [enter[j], leave[j]];
+            if enter <= leave {
+                both |= row(1, 1 << j) & row(2, between(ez, lz, enter, leave));
             }
         }
         met & both
@@ -405,12 +395,11 @@ impl Slabs {
     fn slices(&self, way: &Way, edge: f64) -> u64 {
         let count = (4.0 * edge).min(SLICES as f64) as f32;
         let scale = count / 4.0;
-        let swell = (SWELL + way.haze / edge) as f32;
-        let last = count - 1.0;
-        let low = ((self.z[0] - swell) * scale).clamp(0.0, last) as u32;
-        let high = ((self.z[1] + swell) * scale).clamp(0.0, last) as u32;
+        let last = count as i32 - 1;
+        let low = ((self.z[0] * scale) as i32).clamp(0, last);
+        let high = ((self.z[1] * scale) as i32).clamp(0, last);
         let (low, high) = if way.is_turned[2] {
-            (last as u32 - high, last as u32 - low)
+            (last - high, last - low)
         } else {
             (low, high)
         };
@@ -424,15 +413,18 @@ fn places(child: usize) -> [usize; 3] {
     [0, 1, 2].map(|a| (child >> a & 1) | (child >> (a + 3) & 1) << 1)
 }
 
+/// By a mask of the four places along an axis, what lies at one of them.
+type Rows = [u64; 16];
+
 /// The bits of a brick whose x (or y, or z) is among those of a mask of four, and those whose mirror
 /// image is.
-const ROWS: [[[u64; 16]; 3]; 2] = tables([0, 1, 2, 3, 4, 5]);
+const ROWS: [[Rows; 3]; 2] = tables([0, 1, 2, 3, 4, 5]);
 
 /// The same of a node's children.
-const MORTON: [[[u64; 16]; 3]; 2] = tables([0, 3, 1, 4, 2, 5]);
+const MORTON: [[Rows; 3]; 2] = tables([0, 3, 1, 4, 2, 5]);
 
 /// With the lower and the upper bit of x, of y and of z at these bits of an index.
-const fn tables(bits: [u32; 6]) -> [[[u64; 16]; 3]; 2] {
+const fn tables(bits: [u32; 6]) -> [[Rows; 3]; 2] {
     let mut tables = [[[0; 16]; 3]; 2];
     let mut entry = 0;
     while entry < 2 * 3 * 16 * 64 {
