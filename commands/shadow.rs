@@ -28,15 +28,16 @@ use serde::Serialize;
 pub struct Args {
     #[command(flatten)]
     inputs: Inputs,
-    /// How shadow rays are answered: `octree`, by the octree of the voxels; `dda`, voxel by voxel;
-    /// `exact`, by the triangles
+    /// How shadow rays are answered: `octree`, by the octree of the voxels, which pays where many small
+    /// triangles stand apart, as the twigs of a tree do; `dda`, voxel by voxel; `exact`, by the
+    /// triangles
     #[arg(long, default_value = Params::DEFAULT.method.name(), value_parser = named(Method::NAMES, Method::from_name))]
     method: Method,
     /// Voxels along the longest side of the model
     #[arg(long, value_name = "N", default_value_t = Params::DEFAULT.resolution, value_parser = value_parser!(u32).range(1..=65_536))]
     resolution: u32,
     /// Which voxels the surface sets: `three-axis`, those it meets on a line through their centres;
-    /// `conservative`, all it touches, so that no light leaks
+    /// `conservative`, all it touches, so that no light leaks but where --near skip lets it
     #[arg(long, default_value = Params::DEFAULT.mode.name(), value_parser = named(&["three-axis", "conservative"], Mode::from_name))]
     mode: Mode,
     /// What a ray does until it has left the voxels of the surface on which it starts: `exact`, go by
@@ -59,7 +60,7 @@ pub struct Args {
     #[arg(long, value_name = "WxH", default_value = "1024x768", value_parser = size)]
     size: [u32; 2],
     /// Write the mesh instead of a picture, with the light that each vertex gets as its colour
-    #[arg(long, value_enum)]
+    #[arg(long, value_enum, conflicts_with_all = ["camera", "size"])]
     bake: Option<Bake>,
     #[command(flatten)]
     output: Output,
@@ -111,13 +112,47 @@ fn size(text: &str) -> Result<[u32; 2], String> {
     }
 }
 
-/// What was asked for.
+/// What was asked for; null is what has no effect together with the rest.
 #[derive(Debug, Serialize, JsonSchema)]
 pub struct Asked {
-    #[serde(flatten)]
-    params: Params,
+    /// How shadow rays are answered.
+    method: Method,
+    /// Voxels along the longest side of the model; null for `exact`.
+    resolution: Option<u32>,
+    /// Which voxels the surface sets; null for `exact`.
+    mode: Option<Mode>,
+    /// What rays through voxels do near the surface they start on; null for `exact`.
+    near: Option<Near>,
+    /// Shadow rays for each pixel, or vertex, and light.
+    rays: u32,
+    /// The lights; none where that of the default is taken.
+    lights: Vec<Light>,
+    /// The camera; null where that of the default is taken, or nothing is drawn.
+    camera: Option<View>,
+    /// Columns and rows of the picture; null where nothing is drawn.
+    size: Option<[u32; 2]>,
+    /// What the places of the rays' ends are drawn from.
+    seed: u64,
     /// What the shadows were baked into, null where a picture was drawn.
     bake: Option<&'static str>,
+}
+
+impl Asked {
+    fn new(params: &Params, bake: Option<Bake>) -> Self {
+        let by_voxels = params.method != Method::Exact;
+        Asked {
+            method: params.method,
+            resolution: by_voxels.then_some(params.resolution),
+            mode: by_voxels.then_some(params.mode),
+            near: by_voxels.then_some(params.near),
+            rays: params.rays,
+            lights: params.lights.clone(),
+            camera: params.camera,
+            size: bake.is_none().then_some(params.size),
+            seed: params.seed,
+            bake: bake.map(|_| "vertices"),
+        }
+    }
 }
 
 /// The report of this command.
@@ -179,10 +214,7 @@ fn shadow(job: &mut Job, params: &Params, args: &Args) -> Result<Found<Asked, St
         stats.blocked_rays, stats.shadow_rays
     );
     let (accuracy, modelled) = (stats.accuracy(), stats.modelled());
-    let asked = Asked {
-        params: params.clone(),
-        bake: args.bake.map(|_| "vertices"),
-    };
+    let asked = Asked::new(params, args.bake);
     Ok(Found::new(asked, stats, summary)
         .accuracy(Measures::Many(accuracy))
         .modelled(modelled)

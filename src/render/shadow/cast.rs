@@ -14,10 +14,6 @@ use std::f64::consts::TAU;
 /// Rays go by triangles for at least so many voxels: a voxel that holds the start reaches no farther.
 pub const NEAR_LEAST: f64 = 1.732_050_807_568_877_3;
 
-/// They do so for at most so many voxels: what goes at less than about eight degrees over the surface
-/// may meet voxels of the surface itself.
-pub const NEAR_MOST: f64 = 16.0;
-
 /// Rays start this far over the surface, in lengths of which the model has less than one along its
 /// longest side: more than the rounding of a place on it.
 const LIFT: f64 = 1.0 / (1u64 << 34) as f64;
@@ -287,22 +283,25 @@ impl<'a> Caster<'a> {
         }
     }
 
-    /// The blocked share of rays of their own by triangles.
+    /// The blocked share by triangles of rays of their own: few where these agree, more where not.
     fn reference(&self, starts: &[Start], index: u64) -> f64 {
+        let few = self.reference_of(REFERENCE_RAYS, starts, index);
+        if few == 0.0 || few == 1.0 {
+            return few;
+        }
+        let more = self.params.rays.saturating_mul(4);
+        self.reference_of(more.max(4 * REFERENCE_RAYS), starts, index)
+    }
+
+    fn reference_of(&self, count: u32, starts: &[Start], index: u64) -> f64 {
         let (mut cast, mut blocked) = (0u64, 0u64);
         let seed = !self.params.seed ^ OTHER;
-        self.aim(
-            starts,
-            index,
-            seed,
-            REFERENCE_RAYS,
-            |which, target, cosine| {
-                if cosine > 0.0 {
-                    cast += 1;
-                    blocked += u64::from(self.is_blocked_exactly(&starts[which], target, 1.0));
-                }
-            },
-        );
+        self.aim(starts, index, seed, count, |which, target, cosine| {
+            if cosine > 0.0 {
+                cast += 1;
+                blocked += u64::from(self.is_blocked_exactly(&starts[which], target, 1.0));
+            }
+        });
         blocked as f64 / cast.max(1) as f64
     }
 
@@ -320,14 +319,15 @@ impl<'a> Caster<'a> {
             return self.is_blocked_exactly(start, target, 1.0);
         };
         let mut from = 0.0;
-        if start.on_mesh {
-            let normal = start.normal;
-            let thick = normal[0].abs() + normal[1].abs() + normal[2].abs();
-            let near = ((thick + 1.0) / cosine).clamp(NEAR_LEAST, NEAR_MOST) * grid.lattice.h;
+        let is_exact = self.params.near == Near::Exact;
+        // What lies beside the mesh is in none of its voxels, but maybe near some of them.
+        if is_exact || start.on_mesh {
+            let thick: f64 = start.normal.iter().map(|c| c.abs()).sum();
+            let near = ((thick + 1.0) / cosine).max(NEAR_LEAST) * grid.lattice.h;
             let way = length(sub(target, start.place));
             // Written so that a light on the start itself is near.
             from = if near < way { near / way } else { 1.0 };
-            if self.params.near == Near::Exact && self.is_blocked_exactly(start, target, from) {
+            if is_exact && self.is_blocked_exactly(start, target, from) {
                 return true;
             }
             if from >= 1.0 {

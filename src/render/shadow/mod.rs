@@ -4,11 +4,11 @@
 //! answer shadow rays by an octree of voxels, and never measured what that costs in accuracy.
 //!
 //! A voxel that the surface sets would shade that surface itself. A ray therefore goes by triangles
-//! until it has left the voxels of the surface on which it starts, and by voxels from there: that is
-//! after `(|n_x| + |n_y| + |n_z|) / cos` voxels for a plane of normal n that it leaves at this
-//! angle; one voxel of height is added for surfaces that bend upwards, and the way held between
-//! [`NEAR_LEAST`] and [`NEAR_MOST`]. So in conservative mode no ray can miss a blocker. The paper has no such part; to ignore what is near instead ([`Near::Skip`]) is faster,
-//! and lets light through where things touch.
+//! until it is higher over the surface on which it starts than any of its voxels: those of a plane
+//! with normal n reach `|n_x| + |n_y| + |n_z|` voxels over it, and one more is added for surfaces that
+//! bend upwards. What is on this first part is met exactly, and what is beyond by its voxels, so in
+//! conservative mode no ray misses a blocker. The paper has no such part; to pass what is near instead
+//! ([`Near::Skip`]) is faster, and lets light through where things touch.
 
 mod cast;
 mod params;
@@ -16,19 +16,19 @@ mod picture;
 mod stats;
 mod trade;
 
-pub use cast::{NEAR_LEAST, NEAR_MOST};
+pub use cast::NEAR_LEAST;
 pub use params::{Light, MOST_PIXELS, MOST_RAYS, Method, Near, Params, REFERENCE_RAYS, View};
-pub use stats::{Stats, Verified, Voxels};
+pub use stats::{Shot, Stats, Verified, Voxels};
 pub use trade::TRADE;
 
-use crate::camera::{Camera, Size, THREE_QUARTER};
+use crate::camera::{Camera, Lens, Size, THREE_QUARTER};
 use crate::error::{Error, Fault, Result};
 use crate::image::raster::Raster;
 use crate::mesh::Mesh;
 use crate::mesh::tracer::Tracer;
 use crate::numeric::vector::{Vec3, add, cross, normalize, scale, sub};
 use crate::progress::Progress;
-use crate::report::Modelled;
+use crate::report::{Modelled, Warning};
 use crate::spatial::aabb::Aabb;
 use crate::spatial::local::{exponent_above, times_power_of_two};
 use crate::volume::voxelize::{self, Mode, Storage, voxelize};
@@ -52,7 +52,8 @@ pub fn draw(mesh: &Mesh, params: &Params, progress: &dyn Progress) -> Result<(Ra
     let model = Model::new(mesh, params, progress)?;
     let caster = model.caster(params);
     let (raster, tally) = picture::draw(&model, &caster, params, progress);
-    let stats = model.stats(params, &caster, tally);
+    let mut stats = model.stats(params, &caster, tally);
+    stats.camera = Some(model.shot());
     Ok((raster, stats))
 }
 
@@ -109,6 +110,14 @@ impl Local {
 
     fn length(&self, length: f64) -> f64 {
         times_power_of_two(length, -self.exponent)
+    }
+
+    fn point_back(&self, p: Vec3) -> Vec3 {
+        add(p.map(|c| self.length_back(c)), self.origin)
+    }
+
+    fn length_back(&self, length: f64) -> f64 {
+        times_power_of_two(length, self.exponent)
     }
 }
 
@@ -219,17 +228,35 @@ impl Model {
         sums.into_iter().map(normalize).collect()
     }
 
-    fn stats(&self, params: &Params, caster: &Caster, tally: Tally) -> Stats {
-        let world = |p: Vec3| {
-            add(
-                p.map(|c| times_power_of_two(c, self.local.exponent)),
-                self.local.origin,
-            )
+    /// The camera, in the mesh's unit.
+    fn shot(&self) -> Shot {
+        let Camera {
+            target,
+            unit,
+            axes,
+            distance,
+            lens,
+        } = self.camera;
+        let (fov_deg, height) = match lens {
+            Lens::Perspective { fov_y } => (Some(fov_y.to_degrees()), None),
+            Lens::Orthographic { height } => (None, Some(self.local.length_back(height * unit))),
         };
+        Shot {
+            eye: self
+                .local
+                .point_back(add(target, scale(axes[2], distance * unit))),
+            target: self.local.point_back(target),
+            up: axes[1],
+            fov_deg,
+            height,
+        }
+    }
+
+    fn stats(&self, params: &Params, caster: &Caster, tally: Tally) -> Stats {
         let lights: Vec<Light> = if params.lights.is_empty() {
             let back = |light: &Light| Light {
-                centre: world(light.centre),
-                radius: times_power_of_two(light.radius, self.local.exponent),
+                centre: self.local.point_back(light.centre),
+                radius: self.local.length_back(light.radius),
             };
             self.lights.iter().map(back).collect()
         } else {
@@ -238,7 +265,7 @@ impl Model {
         let triangles = self.mesh.triangles.len() as u64;
         let voxels = self.grid.as_ref().map(|(_, made)| Voxels {
             dims: made.dims,
-            spacing: times_power_of_two(made.spacing[0], self.local.exponent),
+            spacing: self.local.length_back(made.spacing[0]),
             set_voxels: made.set_voxels,
             nodes_visited: tally.visits.nodes,
             voxels_visited: tally.visits.voxels,
@@ -264,9 +291,14 @@ impl Model {
             "lights whose centre lies in a voxel of the surface, from where no light comes",
             &mut warnings,
         );
+        if tally.shaded == 0 {
+            let message = "no place is seen that light could reach: there is no shadow to judge";
+            warnings.push(Warning::new("nothing-shaded", message, 1, None));
+        }
         Stats {
             triangles,
             lights,
+            camera: None,
             shaded: tally.shaded,
             shadow_rays: tally.rays,
             blocked_rays: tally.blocked,

@@ -97,7 +97,7 @@ pub struct View {
 }
 
 /// What [`super::draw`] and [`super::bake`] are asked for.
-#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Params {
     /// How shadow rays are answered.
     pub method: Method,
@@ -118,10 +118,8 @@ pub struct Params {
     /// What the places of the rays' ends are drawn from.
     pub seed: u64,
     /// Whether errors are measured against exact rays.
-    #[serde(skip)]
     pub verify: bool,
     /// Bytes that the voxels may take.
-    #[serde(skip)]
     pub max_memory: u64,
 }
 
@@ -131,7 +129,8 @@ pub const MOST_PIXELS: u32 = 16_384;
 /// Most rays for a pixel and a light.
 pub const MOST_RAYS: u32 = 1 << 20;
 
-/// Rays for each pixel and light of the reference against which [`Params::verify`] measures.
+/// Rays for each pixel and light of the reference against which [`Params::verify`] measures; more in
+/// half shadow.
 pub const REFERENCE_RAYS: u32 = 64;
 
 impl Params {
@@ -233,8 +232,8 @@ impl View {
         if length(cross(normalize(self.up), normalize(back))) < 1e-6 {
             return wrong("up is parallel to the direction of view");
         }
-        if !(self.fov_deg > 0.0 && self.fov_deg < 170.0) {
-            return wrong("the angle of view is not above 0 and below 170 degrees");
+        if !(0.1..=170.0).contains(&self.fov_deg) {
+            return wrong("the angle of view is not from 0.1 to 170 degrees");
         }
         Ok(())
     }

@@ -22,6 +22,21 @@ pub struct Voxels {
     pub voxels_visited: u64,
 }
 
+/// Where a picture was taken from, in the mesh's unit.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
+pub struct Shot {
+    /// Where the viewer was.
+    pub eye: [f64; 3],
+    /// The point in the middle of the picture.
+    pub target: [f64; 3],
+    /// The direction that is up in the picture, of length 1.
+    pub up: [f64; 3],
+    /// Angle from the bottom of the picture to its top, in degrees; null for parallel lines of sight.
+    pub fov_deg: Option<f64>,
+    /// Height of what is seen with parallel lines of sight; null for others.
+    pub height: Option<f64>,
+}
+
 /// How shadows differ from those of exact rays.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct Verified {
@@ -37,8 +52,9 @@ pub struct Verified {
     pub falsely_blocked_rays: u64,
     /// Mean difference of the blocked share, sign left aside, from that of the same rays by triangles.
     pub mean_difference: f64,
-    /// Mean difference from the blocked share of other rays by triangles, [`REFERENCE_RAYS`] for
-    /// each light: what the voxels and the number of rays are off by together.
+    /// Mean difference from the blocked share of other rays by triangles: [`REFERENCE_RAYS`] for each
+    /// light, and where these disagree four times as many, or four times those asked for if that is
+    /// more. It is what the voxels and the number of rays are off by together.
     pub mean_error: f64,
     /// Octree nodes that the same rays visit without the depth mask; null but for `octree`.
     pub nodes_without_mask: Option<u64>,
@@ -53,6 +69,8 @@ pub struct Stats {
     pub triangles: u64,
     /// Lights, those of the default included.
     pub lights: Vec<Light>,
+    /// The camera, that of the default included; null where nothing was drawn.
+    pub camera: Option<Shot>,
     /// Pixels, or vertices, from which a shadow ray was cast.
     pub shaded: u64,
     /// Shadow rays cast; none goes to a light behind the surface.
@@ -79,7 +97,8 @@ impl Stats {
     /// The errors: bounds, and with `verify` what was measured. The first is the one that [`super::TRADE`]
     /// names.
     pub fn accuracy(&self) -> Vec<Accuracy> {
-        let verified = self.verified.as_ref();
+        // No place, no error: neither 0 nor any other.
+        let verified = self.verified.as_ref().filter(|_| self.shaded > 0);
         let share = |count: u64| count as f64 / self.shaded.max(1) as f64;
         let measure =
             |measure: &str, unit: &str, bound, reached: Option<f64>, by: String| Accuracy {
@@ -100,7 +119,9 @@ impl Stats {
                 trade::SOFT.unit,
                 None,
                 verified.map(|v| v.mean_error),
-                format!("{REFERENCE_RAYS} other rays per light by watertight triangles"),
+                format!(
+                    "{REFERENCE_RAYS} other rays per light, and more in half shadow, by watertight triangles"
+                ),
             ),
             measure(
                 "mean difference of the blocked share",

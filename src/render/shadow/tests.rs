@@ -260,7 +260,7 @@ fn what_cannot_be_drawn_is_refused_with_words() {
         "--camera 0.5,3.5,0.5,0.5,0.5,0.5,0.0,1.0,0.0,40.0: up is parallel to the direction of view"
     );
     assert!(why(&cube, seen([3.0; 3], [0.0; 3], 40.0)).ends_with("up has no length"));
-    assert!(why(&cube, seen([3.0; 3], y, 0.0)).contains("not above 0 and below 170 degrees"));
+    assert!(why(&cube, seen([3.0; 3], y, 0.0)).contains("not from 0.1 to 170 degrees"));
     assert!(why(&cube, seen([f64::NAN; 3], y, 9.0)).ends_with("not finite"));
     let none = Params {
         rays: 0,
@@ -338,5 +338,154 @@ fn places_that_make_no_sense_still_give_a_picture() {
         assert_eq!(stats.warnings.len(), warned, "{method:?}");
         let (_, stats) = draw(&point, &small(method), &Silent).expect("a picture");
         assert_eq!(stats.triangles, 1);
+    }
+}
+
+#[test]
+fn a_plane_does_not_shade_itself_however_low_the_light() {
+    let mesh = shapes::sheet(2.0, 2.0, 3, 3);
+    for degrees in [0.5f64, 2.0, 5.0, 10.0, 60.0] {
+        let (sin, cos) = degrees.to_radians().sin_cos();
+        for method in [Method::Octree, Method::Dda] {
+            let params = Params {
+                lights: vec![Light {
+                    centre: [1.0 + 6.0 * cos, 1.0 + 2.0 * cos, 6.0 * sin],
+                    radius: 0.02,
+                }],
+                camera: Some(View {
+                    eye: [1.0, -2.0, 4.0],
+                    target: [1.0, 1.0, 0.0],
+                    up: [0.0, 0.0, 1.0],
+                    fov_deg: 40.0,
+                }),
+                ..small(method)
+            };
+            let (_, stats) = draw(&mesh, &params, &Silent).expect("a picture");
+            assert!(stats.shadow_rays > 1000, "{}", stats.shadow_rays);
+            assert_eq!(stats.blocked_rays, 0, "{method:?} at {degrees} degrees");
+        }
+    }
+}
+
+#[test]
+fn what_stands_on_the_ground_has_no_rim() {
+    // The ground beside a slab lies in voxels of the slab's base.
+    let slab = shapes::cuboid([-2.0, 0.0, -1.5], [2.0, 0.3, 1.5]);
+    let params = Params {
+        lights: vec![Light {
+            centre: [-60.0, 6.0, 10.0],
+            radius: 1.0,
+        }],
+        ..small(Method::Octree)
+    };
+    let found = verified(&slab, &params);
+    let (_, exact) = draw(
+        &slab,
+        &Params {
+            method: Method::Exact,
+            ..params
+        },
+        &Silent,
+    )
+    .expect("a picture");
+    assert!(exact.blocked_rays > 50, "{}", exact.blocked_rays);
+    let falsely = found.falsely_blocked_rays;
+    assert!(
+        falsely * 4 < exact.blocked_rays,
+        "{falsely} {}",
+        exact.blocked_rays
+    );
+}
+
+#[test]
+fn a_seed_makes_a_picture_and_another_seed_another() {
+    let mesh = shapes::torus_knot(2, 3, 0.4, 60, 12);
+    let of = |seed| {
+        let params = Params {
+            seed,
+            ..small(Method::Exact)
+        };
+        draw(&mesh, &params, &Silent).expect("a picture").0
+    };
+    assert!(of(3) == of(3));
+    assert!(of(3) != of(4));
+}
+
+#[test]
+fn light_comes_from_where_it_is() {
+    // A post on the ground, y up, seen from the front, with light from its left.
+    let post = shapes::cuboid([-0.2, 0.0, -0.2], [0.2, 2.0, 0.2]);
+    for method in [Method::Octree, Method::Exact] {
+        let lit_from = |x: f64| {
+            let params = Params {
+                lights: vec![Light {
+                    centre: [x, 6.0, 0.0],
+                    radius: 0.2,
+                }],
+                camera: Some(View {
+                    eye: [0.0, 2.0, 8.0],
+                    target: [0.0, 1.0, 0.0],
+                    up: [0.0, 1.0, 0.0],
+                    fov_deg: 30.0,
+                }),
+                ..small(method)
+            };
+            draw(&post, &params, &Silent).expect("a picture").0
+        };
+        let picture = lit_from(-6.0);
+        let at = |x: usize, y: usize| picture.pixels()[y * 64 + x][1];
+        // On the ground beside the foot: shadow on the right, light on the left.
+        let rows = |x: usize| (34..37).map(move |y| (x, y));
+        let left = (16..28).flat_map(rows).map(|(x, y)| at(x, y));
+        let right = (36..48).flat_map(rows).map(|(x, y)| at(x, y));
+        assert!(left.fold(1.0, f32::min) > 0.99, "{method:?}");
+        assert!(right.fold(1.0, f32::min) < 0.6, "{method:?}");
+        // The post fills the middle, and the sky the top.
+        assert!(at(32, 24) < 0.9 && (0..64).all(|x| at(x, 0) == 1.0));
+        // Light from the other side draws the mirror image.
+        let mirrored = lit_from(6.0);
+        let across = |y: usize| (0..64).map(move |x| (y * 64 + x, y * 64 + 63 - x));
+        let apart = (0..48)
+            .flat_map(across)
+            .map(|(a, b)| (picture.pixels()[a][1] - mirrored.pixels()[b][1]).abs());
+        let mean = apart.sum::<f32>() / (64.0 * 48.0);
+        assert!(mean < 0.02, "{method:?}: {mean}");
+    }
+}
+
+#[test]
+fn half_shadow_is_the_share_of_the_disc_that_is_seen() {
+    // Under the edge x = 0 of a roof at height 5 and a light at height 10, a place at x sees the part
+    // of the light's disc right of -x: beyond a chord (each distance from the roof is the same).
+    let floor = shapes::sheet(0.6, 0.2, 30, 2);
+    let mut mesh = floor.clone();
+    mesh.positions
+        .iter_mut()
+        .for_each(|p| *p = sub(*p, [0.3, 0.1, 0.0]));
+    let roof = shapes::cuboid([-4.0, -4.0, 5.0], [0.0, 4.0, 5.01]);
+    let places = mesh.positions.len();
+    let mesh = shapes::joined(mesh, &roof);
+    let radius = 0.25;
+    for (method, resolution, most) in [(Method::Exact, 1, 0.01), (Method::Octree, 512, 0.04)] {
+        let params = Params {
+            lights: vec![Light {
+                centre: [0.0, 0.0, 10.0],
+                radius,
+            }],
+            rays: 1024,
+            resolution,
+            ..small(method)
+        };
+        let (baked, _) = bake(&mesh, &params, &Silent).expect("colours");
+        let colors = baked.colors.expect("colours");
+        let mut half = 0;
+        for (p, color) in mesh.positions.iter().zip(&colors).take(places) {
+            let chord = (-p[0] / radius).clamp(-1.0, 1.0);
+            let seen = (chord.acos() - chord * (1.0 - chord * chord).sqrt()) / std::f64::consts::PI;
+            let apart = (f64::from(color[0]) - seen).abs();
+            assert!(apart < most, "{method:?} at {}: {} {seen}", p[0], color[0]);
+            half += u64::from((0.1..0.9).contains(&seen));
+        }
+        assert!(half > 20, "{half}");
     }
 }
