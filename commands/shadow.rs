@@ -36,6 +36,9 @@ pub struct Args {
     /// Voxels along the longest side of the model
     #[arg(long, value_name = "N", default_value_t = Params::DEFAULT.resolution, value_parser = value_parser!(u32).range(1..=65_536))]
     resolution: u32,
+    /// Make the octree only where shadow rays go; the picture is the same
+    #[arg(long)]
+    lazy: bool,
     /// Which voxels the surface sets: `three-axis`, those it meets on a line through their centres;
     /// `conservative`, all it touches, so that no light leaks but where --near skip lets it
     #[arg(long, default_value = Params::DEFAULT.mode.name(), value_parser = named(&["three-axis", "conservative"], Mode::from_name))]
@@ -119,6 +122,8 @@ pub struct Asked {
     method: Method,
     /// Voxels along the longest side of the model; null for `exact`.
     resolution: Option<u32>,
+    /// Whether the octree is made only where rays go; null for other methods.
+    lazy: Option<bool>,
     /// Which voxels the surface sets; null for `exact`.
     mode: Option<Mode>,
     /// What rays through voxels do near the surface they start on; null for `exact`.
@@ -143,6 +148,7 @@ impl Asked {
         Asked {
             method: params.method,
             resolution: by_voxels.then_some(params.resolution),
+            lazy: (params.method == Method::Octree).then_some(params.lazy),
             mode: by_voxels.then_some(params.mode),
             near: by_voxels.then_some(params.near),
             rays: params.rays,
@@ -174,6 +180,7 @@ pub fn run(args: &Args) -> Result<Exit> {
     let params = Params {
         method: args.method,
         resolution: args.resolution,
+        lazy: args.lazy,
         mode: args.mode,
         near: args.near,
         rays: args.rays,

@@ -5,7 +5,7 @@
 
 mod rays;
 
-pub use rays::RayTree;
+pub use rays::{Masks as RayMasks, Nodes, RayTree, any_hit, below};
 
 use super::bits::{BitGrid, set_run};
 use crate::error::Fault;

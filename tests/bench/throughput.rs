@@ -2,15 +2,14 @@
 //!
 //! `cargo bench --bench throughput` runs three sizes, each four times the one before, so that the
 //! exponent shows; `-- --quick` runs the smallest once; further words pick benches by name. The
-//! seconds are the least of the repetitions.
+//! seconds are the least of the repetitions. `-- shadow --manual` writes `man/shadow.md` too.
 
 use scantle::error::Fault;
 use scantle::io;
 use scantle::io::source::Source;
 use scantle::io::{npy, nrrd, obj, off, ply, stl};
 use scantle::mesh::{Mesh, shapes};
-use scantle::progress::{Progress, Silent};
-use scantle::render::shadow::{self, Method, Near};
+use scantle::progress::Silent;
 use scantle::volume::voxelize::{Fill, Mode, Params, Size, Storage, voxelize};
 use scantle::volume::{Data, Frame, Volume};
 use serde_json::json;
@@ -18,10 +17,13 @@ use std::io::Write;
 use std::time::Instant;
 
 mod scenes;
+mod shadows;
 
 /// What to run.
 struct Plan {
     quick: bool,
+    /// Whether the page of the manual is written.
+    manual: bool,
     names: Vec<String>,
 }
 
@@ -31,6 +33,7 @@ impl Plan {
         Plan {
             // `cargo bench` adds `--bench`.
             quick: options.iter().any(|option| option == "--quick"),
+            manual: options.iter().any(|option| option == "--manual"),
             names,
         }
     }
@@ -257,94 +260,10 @@ fn voxelizations(plan: &Plan) {
     }
 }
 
-/// Hears when the rays start.
-struct Clock(std::sync::Mutex<Instant>);
-
-impl Progress for Clock {
-    fn stage(&self, _name: &'static str, _units: u64) {
-        *self.0.lock().expect("no holder panics") = Instant::now();
-    }
-
-    fn advance(&self, _units: u64) {}
-}
-
-/// The least seconds that the rays of a picture take, without what is built for them; and its figures.
-fn traced(plan: &Plan, mesh: &Mesh, params: &shadow::Params) -> (f64, shadow::Stats) {
-    let clock = Clock(std::sync::Mutex::new(Instant::now()));
-    let mut least = f64::INFINITY;
-    let (_, stats) = plan.time(plan.repeats().min(3), || {
-        let (_, stats) = shadow::draw(mesh, params, &clock).expect("the shapes have triangles");
-        let started = *clock.0.lock().expect("no holder panics");
-        least = least.min(started.elapsed().as_secs_f64());
-        stats
-    });
-    (least, stats)
-}
-
-/// Tables 2 and 3 of Forest, Barthe and Paulin (2009), in layout: rays per pixel against time at
-/// 128^3, and resolution against time at one ray; with what they lack, the pixels that differ from
-/// exact shadows, and the time of the exact rays.
-fn shadows(plan: &Plan) {
-    if !plan.wants("shadow") {
-        return;
-    }
-    let size = if plan.quick { [64, 48] } else { [512, 384] };
-    let rays = [1, 4, 8, 16, 32, 128].map(|rays| ("rays", 128, rays));
-    let resolutions = [8, 16, 32, 64, 128, 256, 512].map(|n| ("resolution", n, 1));
-    for (name, mesh) in scenes::all() {
-        for (table, resolution, rays) in rays.into_iter().chain(resolutions) {
-            let bench = format!("shadow-{table}-{name}");
-            if !plan.wants(&bench) || plan.quick && (resolution > 128 || rays > 8) {
-                continue;
-            }
-            let params = |method| shadow::Params {
-                method,
-                resolution,
-                rays,
-                size,
-                ..shadow::Params::DEFAULT
-            };
-            let octree = params(Method::Octree);
-            let (seconds, stats) = traced(plan, &mesh, &octree);
-            let skipping = shadow::Params {
-                near: Near::Skip,
-                ..octree.clone()
-            };
-            let (skip_seconds, _) = traced(plan, &mesh, &skipping);
-            let (exact_seconds, _) = traced(plan, &mesh, &params(Method::Exact));
-            let verifying = shadow::Params {
-                verify: true,
-                rays: 1,
-                ..octree
-            };
-            let verified = shadow::draw(&mesh, &verifying, &Silent);
-            let (_, verified) = verified.expect("the shapes have triangles");
-            let found = verified.verified.expect("was asked for");
-            let share = |count: u64| count as f64 / verified.shaded as f64;
-            let line = json!({
-                "bench": bench,
-                "triangles": mesh.triangles.len(),
-                "resolution": resolution,
-                "rays": rays,
-                "pixels": size,
-                "shadow_rays": stats.shadow_rays,
-                "seconds": seconds,
-                "seconds_skipping_near": skip_seconds,
-                "seconds_exact": exact_seconds,
-                "light_leaks": share(found.light_leaks),
-                "false_shadow": share(found.false_shadows),
-                "mean_difference": found.mean_difference,
-                "threads": rayon::current_num_threads(),
-            });
-            println!("{line}");
-        }
-    }
-}
-
 fn main() {
     let plan = Plan::from_words(std::env::args().skip(1));
     meshes(&plan);
     volumes(&plan);
     voxelizations(&plan);
-    shadows(&plan);
+    shadows::run(&plan);
 }

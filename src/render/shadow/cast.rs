@@ -1,14 +1,14 @@
 //! Shadow rays, and what they tell.
 
-use super::{Light, Method, Near, Params, REFERENCE_RAYS};
+use super::{Light, Near, Params, REFERENCE_RAYS};
 use crate::mesh::tracer::{Ray, Tracer};
 use crate::numeric::rng::Rng;
 use crate::numeric::vector::{Vec3, add, cross, dot, length, normalize, scale, sub};
 use crate::report;
 use crate::volume::Data;
-use crate::volume::octree::RayTree;
+use crate::volume::octree::{Octree, RayTree};
 use crate::volume::trace::{GridRay, Visits, any_set};
-use crate::volume::voxelize::Lattice;
+use crate::volume::voxelize::{Lattice, Lazy};
 use std::f64::consts::TAU;
 
 /// Rays go by triangles for at least so many voxels: a voxel that holds the start reaches no farther.
@@ -32,10 +32,20 @@ pub(super) struct Caster<'a> {
     params: &'a Params,
 }
 
-struct Grid<'a> {
-    lattice: Lattice,
-    data: &'a Data,
-    tree: Option<RayTree<'a>>,
+/// The voxels that shadow rays meet.
+pub(super) struct Grid<'a> {
+    pub lattice: Lattice,
+    pub voxels: Voxels<'a>,
+}
+
+/// How voxels are held.
+pub(super) enum Voxels<'a> {
+    /// An octree that is there.
+    Octree(RayTree<'a>, &'a Octree),
+    /// An octree made where rays go.
+    Lazy(Lazy<'a>),
+    /// Voxels to be looked at one by one.
+    Each(&'a Data),
 }
 
 /// A place from which shadow rays start.
@@ -151,24 +161,21 @@ impl Rays {
 impl<'a> Caster<'a> {
     pub fn new(
         tracer: &'a Tracer,
-        grid: Option<(&'a Data, Lattice)>,
+        grid: Option<Grid<'a>>,
         lights: &'a [Light],
         params: &'a Params,
     ) -> Self {
-        let grid = grid.map(|(data, lattice)| Grid {
-            lattice,
-            data,
-            tree: match data {
-                Data::Sparse(tree) if params.method == Method::Octree => Some(RayTree::new(tree)),
-                _ => None,
-            },
-        });
         Caster {
             tracer,
             grid,
             lights,
             params,
         }
+    }
+
+    /// The voxels; none where rays go by triangles alone.
+    pub fn grid(&self) -> Option<&Grid<'a>> {
+        self.grid.as_ref()
     }
 
     /// A place on a surface with a unit normal towards the side that is seen.
@@ -181,12 +188,6 @@ impl<'a> Caster<'a> {
         }
     }
 
-    /// Bytes that the octree takes with its layout for rays; 0 where there is none.
-    pub fn bytes(&self) -> u64 {
-        let tree = self.grid.as_ref().and_then(|grid| grid.tree.as_ref());
-        tree.map_or(0, RayTree::bytes)
-    }
-
     /// Lights whose centre lies in a voxel that is set.
     pub fn lights_in_voxels(&self) -> report::Tally {
         let mut found = report::Tally::default();
@@ -196,7 +197,7 @@ impl<'a> Caster<'a> {
         for (index, light) in self.lights.iter().enumerate() {
             let centre = grid.lattice.to_grid(light.centre);
             let point = GridRay::new(centre, [0.0; 3], [0.0; 2]);
-            if grid.walk(&point, &mut Visits::default()) {
+            if grid.any_hit(&point, &mut Visits::default()) {
                 found.note(index as u64);
             }
         }
@@ -338,29 +339,39 @@ impl<'a> Caster<'a> {
         let direction = sub(grid.lattice.to_grid(target), origin);
         let ray = GridRay::new(origin, direction, [from, 1.0]);
         if self.params.verify {
-            if let Some(tree) = &grid.tree {
+            if let Voxels::Octree(tree, _) = &grid.voxels {
                 tree.any_hit(&ray, false, &mut rays.unmasked);
             }
             grid.walk(&ray, &mut rays.crossed);
         }
-        match &grid.tree {
-            Some(tree) => tree.any_hit(&ray, true, &mut rays.visits),
-            None => grid.walk(&ray, &mut rays.visits),
-        }
+        grid.any_hit(&ray, &mut rays.visits)
     }
 }
 
 impl Grid<'_> {
-    fn get(&self, x: usize, y: usize, z: usize) -> bool {
-        match self.data {
-            Data::Bits(bits) => bits.get(x, y, z),
-            Data::Sparse(tree) => tree.get(x, y, z),
-            _ => false,
+    /// Whether a ray hits a voxel.
+    fn any_hit(&self, ray: &GridRay, visits: &mut Visits) -> bool {
+        match &self.voxels {
+            Voxels::Octree(tree, _) => tree.any_hit(ray, true, visits),
+            Voxels::Lazy(tree) => tree.any_hit(ray, visits),
+            Voxels::Each(_) => self.walk(ray, visits),
         }
     }
 
+    /// The same voxel by voxel; no voxel of an octree that is made where rays go.
     fn walk(&self, ray: &GridRay, visits: &mut Visits) -> bool {
-        any_set(self.lattice.dims, ray, |x, y, z| self.get(x, y, z), visits)
+        let dims = self.lattice.dims;
+        match &self.voxels {
+            Voxels::Lazy(_) => false,
+            Voxels::Octree(_, tree) => any_set(dims, ray, |x, y, z| tree.get(x, y, z), visits),
+            Voxels::Each(Data::Sparse(tree)) => {
+                any_set(dims, ray, |x, y, z| tree.get(x, y, z), visits)
+            }
+            Voxels::Each(Data::Bits(bits)) => {
+                any_set(dims, ray, |x, y, z| bits.get(x, y, z), visits)
+            }
+            Voxels::Each(_) => false,
+        }
     }
 }
 

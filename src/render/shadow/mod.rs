@@ -18,7 +18,7 @@ mod trade;
 
 pub use cast::NEAR_LEAST;
 pub use params::{Light, MOST_PIXELS, MOST_RAYS, Method, Near, Params, REFERENCE_RAYS, View};
-pub use stats::{Shot, Stats, Verified, Voxels};
+pub use stats::{Shot, Stats, Verified};
 pub use trade::TRADE;
 
 use crate::camera::{Camera, Lens, Size, THREE_QUARTER};
@@ -31,9 +31,10 @@ use crate::progress::Progress;
 use crate::report::{Modelled, Warning};
 use crate::spatial::aabb::Aabb;
 use crate::spatial::local::{exponent_above, times_power_of_two};
-use crate::volume::voxelize::{self, Mode, Storage, voxelize};
+use crate::volume::octree::RayTree;
+use crate::volume::voxelize::{self, Lazy, Mode, voxelize};
 use crate::volume::{Data, Volume};
-use cast::{Caster, Tally};
+use cast::{Caster, Grid, Tally, Voxels};
 use rayon::prelude::*;
 
 /// Draws the mesh under its lights, on a white ground that takes its shadow.
@@ -50,7 +51,7 @@ use rayon::prelude::*;
 /// light for each pixel.
 pub fn draw(mesh: &Mesh, params: &Params, progress: &dyn Progress) -> Result<(Raster, Stats)> {
     let model = Model::new(mesh, params, progress)?;
-    let caster = model.caster(params);
+    let caster = model.caster(params, progress)?;
     let (raster, tally) = picture::draw(&model, &caster, params, progress);
     let mut stats = model.stats(params, &caster, tally);
     stats.camera = Some(model.shot());
@@ -64,7 +65,7 @@ pub fn draw(mesh: &Mesh, params: &Params, progress: &dyn Progress) -> Result<(Ra
 /// are black. Errs and costs as [`draw`], with vertices for pixels.
 pub fn bake(mesh: &Mesh, params: &Params, progress: &dyn Progress) -> Result<(Mesh, Stats)> {
     let model = Model::new(mesh, params, progress)?;
-    let caster = model.caster(params);
+    let caster = model.caster(params, progress)?;
     progress.stage("trace", model.mesh.positions.len() as u64);
     let normals = model.normals();
     let found: Vec<(f64, Tally)> = (0..normals.len())
@@ -144,24 +145,10 @@ impl Model {
         progress.stage("layout", 0);
         let (local, mesh) = localized(mesh)?;
         let tracer = Tracer::new(&mesh);
-        let grid = match params.method {
-            Method::Exact => None,
-            method => {
-                let asked = voxelize::Params {
-                    size: voxelize::Size::Resolution(params.resolution),
-                    mode: params.mode,
-                    grid: if method == Method::Octree {
-                        Storage::Sparse
-                    } else {
-                        Storage::Auto
-                    },
-                    // A margin would only make the tree's root larger.
-                    pad: 0,
-                    max_memory: params.max_memory,
-                    ..voxelize::Params::DEFAULT
-                };
-                Some(voxelize(&mesh, &asked, progress)?)
-            }
+        let grid = if params.method == Method::Exact || params.lazy {
+            None
+        } else {
+            Some(voxelize(&mesh, &params.voxels(), progress)?)
         };
         let up = params.camera.map_or([0.0, 1.0, 0.0], |view| view.up);
         let up = normalize(up);
@@ -208,10 +195,25 @@ impl Model {
         })
     }
 
-    fn caster<'a>(&'a self, params: &'a Params) -> Caster<'a> {
-        let grid = self.grid.as_ref();
-        let grid = grid.map(|(volume, made)| (&volume.data, made.lattice()));
-        Caster::new(&self.tracer, grid, &self.lights, params)
+    fn caster<'a>(&'a self, params: &'a Params, progress: &dyn Progress) -> Result<Caster<'a>> {
+        let grid = match &self.grid {
+            None if params.lazy => {
+                let lazy = Lazy::new(&self.mesh, &params.voxels(), progress)?;
+                Some((lazy.lattice(), Voxels::Lazy(lazy)))
+            }
+            None => None,
+            Some((volume, made)) => {
+                let voxels = match &volume.data {
+                    Data::Sparse(tree) if params.method == Method::Octree => {
+                        Voxels::Octree(RayTree::new(tree), tree)
+                    }
+                    data => Voxels::Each(data),
+                };
+                Some((made.lattice(), voxels))
+            }
+        };
+        let grid = grid.map(|(lattice, voxels)| Grid { lattice, voxels });
+        Ok(Caster::new(&self.tracer, grid, &self.lights, params))
     }
 
     /// A unit normal for each vertex; 0 where none is known.
@@ -263,28 +265,14 @@ impl Model {
             params.lights.clone()
         };
         let triangles = self.mesh.triangles.len() as u64;
-        let voxels = self.grid.as_ref().map(|(_, made)| Voxels {
-            dims: made.dims,
-            spacing: self.local.length_back(made.spacing[0]),
-            set_voxels: made.set_voxels,
+        let (set_voxels, modelled) = self.made(caster);
+        let voxels = caster.grid().map(|grid| stats::Voxels {
+            dims: grid.lattice.dims.map(|d| d as u64),
+            spacing: self.local.length_back(grid.lattice.h),
+            set_voxels,
             nodes_visited: tally.visits.nodes,
             voxels_visited: tally.visits.voxels,
         });
-        let modelled = match (&self.grid, params.method) {
-            (Some((_, made)), Method::Octree) => Modelled {
-                bytes: caster.bytes(),
-                ..made.modelled()
-            },
-            (Some((volume, made)), _) => {
-                let count = volume.frame.len() as u64;
-                let bytes = match &volume.data {
-                    Data::Sparse(tree) => tree.bytes(),
-                    _ => made.dense_bytes,
-                };
-                Modelled::new("voxels", count, count, bytes)
-            }
-            (None, _) => Modelled::new("triangles", triangles, triangles, self.tracer.bytes()),
-        };
         let mut warnings = Vec::new();
         caster.lights_in_voxels().warn(
             "light-in-voxel",
@@ -303,11 +291,44 @@ impl Model {
             shadow_rays: tally.rays,
             blocked_rays: tally.blocked,
             voxels,
-            verified: params.verify.then(|| tally.verified(params.method)),
+            verified: params
+                .verify
+                .then(|| tally.verified(params.method, params.lazy)),
             method: params.method,
             guarded: params.mode == Mode::Conservative && params.near == Near::Exact,
             modelled,
             warnings,
+        }
+    }
+}
+
+impl Model {
+    /// How many voxels are set, and how much of the full model was made.
+    fn made(&self, caster: &Caster) -> (u64, Modelled) {
+        let grid = caster.grid().map(|grid| &grid.voxels);
+        match (grid, &self.grid) {
+            (Some(Voxels::Lazy(lazy)), _) => (lazy.extent().set_voxels, lazy.modelled()),
+            (Some(Voxels::Octree(tree, _)), Some((_, made))) => {
+                let bytes = tree.bytes();
+                let modelled = made.modelled();
+                (made.set_voxels, Modelled { bytes, ..modelled })
+            }
+            (_, Some((volume, made))) => {
+                let count = volume.frame.len() as u64;
+                let bytes = match &volume.data {
+                    Data::Sparse(tree) => tree.bytes(),
+                    _ => made.dense_bytes,
+                };
+                (
+                    made.set_voxels,
+                    Modelled::new("voxels", count, count, bytes),
+                )
+            }
+            (_, None) => {
+                let triangles = self.mesh.triangles.len() as u64;
+                let bytes = self.tracer.bytes();
+                (0, Modelled::new("triangles", triangles, triangles, bytes))
+            }
         }
     }
 }

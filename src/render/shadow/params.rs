@@ -2,7 +2,7 @@
 
 use crate::error::{Error, Result};
 use crate::numeric::vector::{cross, length, normalize, sub};
-use crate::volume::voxelize::Mode;
+use crate::volume::voxelize::{self, Mode, Storage};
 use schemars::JsonSchema;
 use serde::Serialize;
 
@@ -103,6 +103,8 @@ pub struct Params {
     pub method: Method,
     /// Voxels along the longest side of the model.
     pub resolution: u32,
+    /// Whether the octree is made only where rays go.
+    pub lazy: bool,
     /// Which voxels the surface sets: `three-axis` or `conservative`.
     pub mode: Mode,
     /// What rays through voxels do near the surface they start on.
@@ -138,6 +140,7 @@ impl Params {
     pub const DEFAULT: Params = Params {
         method: Method::Octree,
         resolution: 256,
+        lazy: false,
         mode: Mode::Conservative,
         near: Near::Exact,
         rays: 16,
@@ -168,10 +171,33 @@ impl Params {
             let problem = "lets light through walls; use three-axis or conservative";
             return Err(Error::parameter("mode", self.mode.name(), problem));
         }
+        if self.lazy && self.method != Method::Octree {
+            let problem = "makes the octree, which --method octree alone goes by";
+            return Err(Error::parameter("lazy", true, problem));
+        }
         for light in &self.lights {
             light.check()?;
         }
         self.camera.as_ref().map_or(Ok(()), View::check)
+    }
+}
+
+impl Params {
+    /// The voxels that are asked for.
+    pub(super) fn voxels(&self) -> voxelize::Params {
+        voxelize::Params {
+            size: voxelize::Size::Resolution(self.resolution),
+            mode: self.mode,
+            grid: if self.method == Method::Octree {
+                Storage::Sparse
+            } else {
+                Storage::Auto
+            },
+            // A margin would only make the tree's root larger.
+            pad: 0,
+            max_memory: self.max_memory,
+            ..voxelize::Params::DEFAULT
+        }
     }
 }
 

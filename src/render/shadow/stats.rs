@@ -14,7 +14,7 @@ pub struct Voxels {
     pub dims: [u64; 3],
     /// Edge of a voxel, in the mesh's unit.
     pub spacing: f64,
-    /// Voxels set.
+    /// Voxels set; where the octree is made only as far as rays go, those that are known.
     pub set_voxels: u64,
     /// Octree nodes whose children rays looked at; 0 for `dda`.
     pub nodes_visited: u64,
@@ -56,9 +56,11 @@ pub struct Verified {
     /// light, and where these disagree four times as many, or four times those asked for if that is
     /// more. It is what the voxels and the number of rays are off by together.
     pub mean_error: f64,
-    /// Octree nodes that the same rays visit without the depth mask; null but for `octree`.
+    /// Octree nodes that the same rays visit without the depth mask; null but for `octree`, and where it
+    /// is made lazily.
     pub nodes_without_mask: Option<u64>,
-    /// Voxels that the same rays cross one by one; null for `exact`.
+    /// Voxels that the same rays cross one by one; null for `exact`, and for an octree
+    /// made lazily.
     pub voxels_crossed: Option<u64>,
 }
 
@@ -154,7 +156,7 @@ impl Stats {
 }
 
 impl Tally {
-    pub(super) fn verified(&self, method: Method) -> Verified {
+    pub(super) fn verified(&self, method: Method, lazy: bool) -> Verified {
         let voxels = method != Method::Exact;
         let mean = |sum: f64| sum / self.shaded.max(1) as f64;
         let Visits { nodes, .. } = self.unmasked;
@@ -166,8 +168,8 @@ impl Tally {
             falsely_blocked_rays: self.falsely,
             mean_difference: mean(self.difference),
             mean_error: mean(self.error),
-            nodes_without_mask: (method == Method::Octree).then_some(nodes),
-            voxels_crossed: voxels.then_some(self.crossed.voxels),
+            nodes_without_mask: (method == Method::Octree && !lazy).then_some(nodes),
+            voxels_crossed: (voxels && !lazy).then_some(self.crossed.voxels),
         }
     }
 }

@@ -489,3 +489,49 @@ fn half_shadow_is_the_share_of_the_disc_that_is_seen() {
         assert!(half > 20, "{half}");
     }
 }
+
+#[test]
+fn an_octree_made_where_rays_go_gives_the_same_picture_from_fewer_nodes() {
+    // A look at one place of a large model.
+    let mesh = shapes::torus_knot(2, 3, 0.4, 80, 16);
+    let place = mesh.positions[0];
+    for mode in [Mode::ThreeAxis, Mode::Conservative] {
+        let of = |lazy| {
+            let params = Params {
+                lazy,
+                mode,
+                resolution: 128,
+                verify: true,
+                camera: Some(View {
+                    eye: add(place, [3.0, 4.0, 9.0]),
+                    target: place,
+                    up: [0.0, 1.0, 0.0],
+                    fov_deg: 4.0,
+                }),
+                ..small(Method::Octree)
+            };
+            draw(&mesh, &params, &Silent).expect("a picture")
+        };
+        let (whole, lazy) = (of(false), of(true));
+        assert!(whole.0 == lazy.0, "{mode:?}");
+        let made = |stats: &Stats| stats.modelled().made;
+        let nodes = (made(&lazy.1), made(&whole.1));
+        assert!(
+            100 < nodes.0 && nodes.0 * 2 < nodes.1,
+            "{mode:?}: {nodes:?}"
+        );
+        assert_eq!(whole.1.modelled().full, lazy.1.modelled().full);
+        assert_eq!(whole.1.blocked_rays, lazy.1.blocked_rays);
+    }
+    let by_walk = Params {
+        lazy: true,
+        ..small(Method::Dda)
+    };
+    let why = draw(&mesh, &by_walk, &Silent)
+        .expect_err("a refusal")
+        .to_string();
+    assert_eq!(
+        why,
+        "--lazy true: makes the octree, which --method octree alone goes by"
+    );
+}

@@ -5,9 +5,6 @@ use crate::numeric::vector::Vec3;
 use crate::volume::trace::{GridRay, Visits};
 use wide::f32x4;
 
-/// Most levels of nodes: for a grid of [`super::MAX_DIM`] voxels along a side.
-const DEPTH: usize = 8;
-
 /// Slices that the profile of a node tells apart.
 const SLICES: usize = 64;
 
@@ -19,30 +16,57 @@ const SWELL: f64 = 1.0 / (1u64 << 12) as f64;
 /// across the largest grid that moves a ray by less than [`SWELL`] of a voxel.
 const LEAST: f64 = 1.0 / (1u64 << 40) as f64;
 
-/// An octree laid out for rays: each node with its grandchildren, two levels in one.
+/// What rays ask of an octree: each node with its grandchildren, two levels in one.
 ///
 /// Grandchild `i` of a node of edge `4 e` lies at `e (b0 + 2 b3, b1 + 2 b4, b2 + 2 b5)` from its lower
 /// corner, where `b` are the bits of `i`; those of nodes of edge 16 are bricks.
+pub trait Nodes {
+    /// A node or a brick.
+    type At: Copy;
+
+    /// Voxels along x, y, z.
+    fn dims(&self) -> [usize; 3];
+
+    /// Edge of the root in voxels, a power of 4 from 16 on.
+    fn edge(&self) -> usize;
+
+    /// The root.
+    fn root(&self) -> Self::At;
+
+    /// Which children a node has.
+    fn masks(&self, node: Self::At) -> Masks;
+
+    /// A child of a node that is a node, or a brick, of its own.
+    fn below(&self, node: Self::At, child: usize) -> Self::At;
+
+    /// The voxels of a brick: voxel (x, y, z) is bit `x + 4 y + 16 z`.
+    fn brick(&self, brick: Self::At) -> u64;
+}
+
+/// The children of a node.
+#[derive(Debug, Clone, Copy)]
+pub struct Masks {
+    /// Which are nodes, or bricks, of their own.
+    pub mixed: u64,
+    /// Which are all set.
+    pub full: u64,
+    /// Which slices across z hold a set voxel: one bit per slice of a node of up to 64 voxels, one
+    /// per 64th of a larger one.
+    pub profile: u64,
+}
+
+/// An octree laid out for rays.
 #[derive(Debug)]
 pub struct RayTree<'a> {
     tree: &'a Octree,
-    /// Edge of the root in voxels, a power of 4.
     edge: usize,
     levels: Vec<Vec<Node>>,
-    /// One over the edge of the children of each level.
-    per_edge: Vec<f64>,
 }
 
 /// A node and its grandchildren.
 #[derive(Debug, Clone, Copy)]
 struct Node {
-    /// Which are nodes, or bricks, of their own.
-    mixed: u64,
-    /// Which are all set.
-    full: u64,
-    /// Which slices across z hold a set voxel: one bit per slice of a node of up to 64 voxels, one
-    /// per 64th of a larger one.
-    profile: u64,
+    masks: Masks,
     /// Index of the first in the next level, or among the bricks.
     first: u32,
 }
@@ -52,7 +76,7 @@ impl<'a> RayTree<'a> {
     ///
     /// Cost: one pass over the bricks and the nodes; 32 bytes held for each node of every second level.
     pub fn new(tree: &'a Octree) -> Self {
-        let mut levels = Vec::with_capacity(DEPTH);
+        let mut levels = Vec::new();
         let mut below: Vec<u64> = tree.bricks.iter().map(|bits| layers(*bits)).collect();
         let mut edge = 4;
         let mut rest = &tree.levels[..];
@@ -61,53 +85,46 @@ impl<'a> RayTree<'a> {
             let child_slices = (edge / 4).min(SLICES);
             let count = above.last().map_or(1, |upper| upper.mixed.len());
             let node = |index: usize| {
-                let mut node = match above.last() {
+                let (mut mixed, mut full) = (0, 0);
+                let first = match above.last() {
                     // With an odd number of levels the root has children in one corner.
-                    None => Node {
-                        mixed: u64::from(lower.mixed[0]),
-                        full: u64::from(lower.full[0]),
-                        profile: 0,
-                        first: lower.first[0],
-                    },
+                    None => {
+                        mixed = u64::from(lower.mixed[0]);
+                        full = u64::from(lower.full[0]);
+                        lower.first[0]
+                    }
                     Some(upper) => {
                         let first = upper.first[index] as usize;
-                        let mut node = Node {
-                            mixed: 0,
-                            full: 0,
-                            profile: 0,
-                            first: lower.first.get(first).copied().unwrap_or(0),
-                        };
                         let mut next = first;
                         for child in 0..8 {
                             if upper.mixed[index] >> child & 1 == 1 {
-                                node.mixed |= u64::from(lower.mixed[next]) << (8 * child);
-                                node.full |= u64::from(lower.full[next]) << (8 * child);
+                                mixed |= u64::from(lower.mixed[next]) << (8 * child);
+                                full |= u64::from(lower.full[next]) << (8 * child);
                                 next += 1;
                             } else if upper.full[index] >> child & 1 == 1 {
-                                node.full |= 0xff << (8 * child);
+                                full |= 0xff << (8 * child);
                             }
                         }
-                        node
+                        lower.first.get(first).copied().unwrap_or(0)
                     }
                 };
-                node.profile = profile(&node, &below, child_slices);
-                node
+                let profile = profile([mixed, full], &below[first as usize..], child_slices);
+                Node {
+                    masks: Masks {
+                        mixed,
+                        full,
+                        profile,
+                    },
+                    first,
+                }
             };
             let nodes: Vec<Node> = (0..count).map(node).collect();
-            below = nodes.iter().map(|node| node.profile).collect();
+            below = nodes.iter().map(|node| node.masks.profile).collect();
             levels.push(nodes);
             rest = above.split_last().map_or(&[], |(_, above)| above);
         }
         levels.reverse();
-        let per_edge = (0..levels.len())
-            .map(|depth| 1.0 / (edge >> (2 * depth + 2)) as f64)
-            .collect();
-        RayTree {
-            tree,
-            edge,
-            levels,
-            per_edge,
-        }
+        RayTree { tree, edge, levels }
     }
 
     /// Bytes held, those of the octree included.
@@ -116,124 +133,175 @@ impl<'a> RayTree<'a> {
         self.tree.bytes() + (nodes * size_of::<Node>()) as u64
     }
 
-    /// Whether a ray hits a set voxel, by the rule of [`GridRay::hits`].
-    ///
-    /// With `masked`, a node is left at once when none of its slices between those in which the ray
-    /// enters and leaves it holds anything; without, only what is empty as a whole is left out. The
-    /// answer is the same. Cost: the nodes on the way, front to back, until one voxel is hit.
-    ///
-    /// Revelles, Ureña and Lastra, "An efficient parametric algorithm for octree traversal" (2000),
-    /// for two levels at once, without recursion; the mask is that of Forest, Barthe and Paulin,
-    /// "Real-time hierarchical binary-scene voxelization" (2009). Children are chosen in single
-    /// precision with room for its rounding, so some that the ray just misses are looked at; voxels
-    /// and full cubes are hit by the rule alone.
+    /// Whether a ray hits a set voxel: see [`any_hit`].
     pub fn any_hit(&self, ray: &GridRay, masked: bool, visits: &mut Visits) -> bool {
-        let dims = self.tree.dims.map(|d| d as f64);
-        let [start, end] = ray.cuboid([0.0; 3], dims);
-        if start.is_nan() || end.is_nan() || start > end {
-            return false;
-        }
-        let (way, length) = Way::new(ray, [start, end], self.edge as f64, masked);
-        self.enter(&way, [0, 0], [0.0; 3], [0.0, length], visits)
-    }
-
-    /// Whether the ray hits a voxel of a node, which it is in between two parameters.
-    fn enter(
-        &self,
-        way: &Way,
-        [depth, index]: [usize; 2],
-        corner: Vec3,
-        span: [f64; 2],
-        visits: &mut Visits,
-    ) -> bool {
-        let node = &self.levels[depth][index];
-        let edge = (self.edge >> (2 * depth + 2)) as f64;
-        let slabs = Slabs::new(way, corner, self.per_edge[depth], span);
-        if way.masked && node.profile & slabs.slices(way, edge) == 0 {
-            return false;
-        }
-        visits.nodes += 1;
-        let met = slabs.met(&way.children, node.mixed | node.full);
-        if met & node.full != 0 && self.hits_full(way, met & node.full, corner, edge) {
-            return true;
-        }
-        let mut rest = in_order(met & node.mixed, way.flip);
-        while rest != 0 {
-            let order = rest.trailing_zeros() as usize;
-            rest &= rest - 1;
-            let below = node.below(order ^ way.flip);
-            let place = places(order);
-            let corner = std::array::from_fn(|a| corner[a] + place[a] as f64 * edge);
-            let within = slabs.within(place);
-            let span = within.map(|t| span[0] + f64::from(t) * edge);
-            let hits = if depth + 1 == self.levels.len() {
-                self.brick(way, below, corner, span, visits)
-            } else {
-                self.enter(way, [depth + 1, below], corner, span, visits)
-            };
-            if hits {
-                return true;
-            }
-        }
-        false
-    }
-
-    /// Whether the ray hits one of the children of a mask, which are all set.
-    #[cold]
-    fn hits_full(&self, way: &Way, full: u64, corner: Vec3, edge: f64) -> bool {
-        let mut rest = full;
-        while rest != 0 {
-            let place = places(rest.trailing_zeros() as usize ^ way.flip);
-            rest &= rest - 1;
-            let corner = std::array::from_fn(|a| corner[a] + place[a] as f64 * edge);
-            let [first, last] = way.ray.cuboid(way.turned_back(corner, edge), [edge; 3]);
-            if first <= last {
-                return true;
-            }
-        }
-        false
-    }
-
-    /// Whether the ray hits a voxel of a brick.
-    #[inline]
-    fn brick(
-        &self,
-        way: &Way,
-        index: usize,
-        corner: Vec3,
-        span: [f64; 2],
-        visits: &mut Visits,
-    ) -> bool {
-        visits.nodes += 1;
-        let slabs = Slabs::new(way, corner, 1.0, span);
-        let bits = self.tree.bricks[index];
-        let mut rest = bits & slabs.met(&way.voxels, bits);
-        if rest == 0 {
-            return false;
-        }
-        let corner = way.turned_back(corner, 4.0);
-        while rest != 0 {
-            let bit = rest.trailing_zeros() as usize;
-            rest &= rest - 1;
-            visits.voxels += 1;
-            let voxel = [bit & 3, bit >> 2 & 3, bit >> 4];
-            let voxel = std::array::from_fn(|a| corner[a] + voxel[a] as f64);
-            let [first, last] = way.ray.cuboid(voxel, [1.0; 3]);
-            if first <= last {
-                return true;
-            }
-        }
-        false
+        any_hit(self, ray, masked, visits)
     }
 }
 
-impl Node {
-    /// The index of a child in the level below.
-    #[inline]
-    fn below(&self, child: usize) -> usize {
-        let before = self.mixed & ((1 << child) - 1);
-        self.first as usize + before.count_ones() as usize
+impl Nodes for RayTree<'_> {
+    /// Its depth and its index; of a brick the index counts.
+    type At = [u32; 2];
+
+    fn dims(&self) -> [usize; 3] {
+        self.tree.dims
     }
+
+    fn edge(&self) -> usize {
+        self.edge
+    }
+
+    fn root(&self) -> [u32; 2] {
+        [0, 0]
+    }
+
+    #[inline]
+    fn masks(&self, [depth, index]: [u32; 2]) -> Masks {
+        self.levels[depth as usize][index as usize].masks
+    }
+
+    #[inline]
+    fn below(&self, [depth, index]: [u32; 2], child: usize) -> [u32; 2] {
+        let node = &self.levels[depth as usize][index as usize];
+        [depth + 1, node.first + below(node.masks.mixed, child)]
+    }
+
+    #[inline]
+    fn brick(&self, [_, index]: [u32; 2]) -> u64 {
+        self.tree.bricks[index as usize]
+    }
+}
+
+/// How many of the children that are nodes come before one of them.
+#[inline]
+pub fn below(mixed: u64, child: usize) -> u32 {
+    (mixed & ((1 << child) - 1)).count_ones()
+}
+
+/// Whether a ray hits a set voxel, by the rule of [`GridRay::hits`].
+///
+/// With `masked`, a node is left at once when none of its slices between those in which the ray enters
+/// and leaves it holds anything; without, only what is empty as a whole is left out. The answer is the
+/// same. Cost: the nodes on the way, front to back, until one voxel is hit.
+///
+/// Revelles, Ureña and Lastra, "An efficient parametric algorithm for octree traversal" (2000), for
+/// two levels at once; the mask is that of Forest, Barthe and Paulin, "Real-time hierarchical
+/// binary-scene voxelization" (2009). Children are chosen in single precision with room for its
+/// rounding, so some that the ray just misses are looked at; voxels and full cubes are hit by the rule
+/// alone.
+pub fn any_hit<N: Nodes>(nodes: &N, ray: &GridRay, masked: bool, visits: &mut Visits) -> bool {
+    let dims = nodes.dims().map(|d| d as f64);
+    let [start, end] = ray.cuboid([0.0; 3], dims);
+    if start.is_nan() || end.is_nan() || start > end {
+        return false;
+    }
+    let edge = nodes.edge() as f64;
+    let (way, length) = Way::new(ray, [start, end], edge, masked);
+    let child = Edge {
+        edge: edge / 4.0,
+        inverse: 4.0 / edge,
+    };
+    enter(
+        nodes,
+        &way,
+        nodes.root(),
+        child,
+        [0.0; 3],
+        [0.0, length],
+        visits,
+    )
+}
+
+/// The edge of a node's children, and one over it.
+#[derive(Clone, Copy)]
+struct Edge {
+    edge: f64,
+    inverse: f64,
+}
+
+/// Whether the ray hits a voxel of a node, which it is in between two parameters.
+fn enter<N: Nodes>(
+    nodes: &N,
+    way: &Way,
+    node: N::At,
+    child: Edge,
+    corner: Vec3,
+    span: [f64; 2],
+    visits: &mut Visits,
+) -> bool {
+    let masks = nodes.masks(node);
+    let slabs = Slabs::new(way, corner, child.inverse, span);
+    if way.masked && masks.profile & slabs.slices(way, child.edge) == 0 {
+        return false;
+    }
+    visits.nodes += 1;
+    let met = slabs.met(&way.children, masks.mixed | masks.full);
+    if met & masks.full != 0 && hits_full(way, met & masks.full, corner, child.edge) {
+        return true;
+    }
+    let mut rest = in_order(met & masks.mixed, way.flip);
+    while rest != 0 {
+        let order = rest.trailing_zeros() as usize;
+        rest &= rest - 1;
+        let below = nodes.below(node, order ^ way.flip);
+        let place = places(order);
+        let corner = std::array::from_fn(|a| corner[a] + place[a] as f64 * child.edge);
+        let within = slabs.within(place);
+        let span = within.map(|t| span[0] + f64::from(t) * child.edge);
+        let hits = if child.edge == 4.0 {
+            hits_brick(nodes.brick(below), way, corner, span, visits)
+        } else {
+            let grandchild = Edge {
+                edge: child.edge / 4.0,
+                inverse: child.inverse * 4.0,
+            };
+            enter(nodes, way, below, grandchild, corner, span, visits)
+        };
+        if hits {
+            return true;
+        }
+    }
+    false
+}
+
+/// Whether the ray hits one of the children of a mask, which are all set.
+#[cold]
+fn hits_full(way: &Way, full: u64, corner: Vec3, edge: f64) -> bool {
+    let mut rest = full;
+    while rest != 0 {
+        let place = places(rest.trailing_zeros() as usize ^ way.flip);
+        rest &= rest - 1;
+        let corner = std::array::from_fn(|a| corner[a] + place[a] as f64 * edge);
+        let [first, last] = way.ray.cuboid(way.turned_back(corner, edge), [edge; 3]);
+        if first <= last {
+            return true;
+        }
+    }
+    false
+}
+
+/// Whether the ray hits a voxel of a brick.
+#[inline]
+fn hits_brick(bits: u64, way: &Way, corner: Vec3, span: [f64; 2], visits: &mut Visits) -> bool {
+    visits.nodes += 1;
+    let slabs = Slabs::new(way, corner, 1.0, span);
+    let mut rest = bits & slabs.met(&way.voxels, bits);
+    if rest == 0 {
+        return false;
+    }
+    let corner = way.turned_back(corner, 4.0);
+    while rest != 0 {
+        let bit = rest.trailing_zeros() as usize;
+        rest &= rest - 1;
+        visits.voxels += 1;
+        let voxel = [bit & 3, bit >> 2 & 3, bit >> 4];
+        let voxel = std::array::from_fn(|a| corner[a] + voxel[a] as f64);
+        let [first, last] = way.ray.cuboid(voxel, [1.0; 3]);
+        if first <= last {
+            return true;
+        }
+    }
+    false
 }
 
 /// A ray in the tree, turned so that it goes upwards along all axes, from where it enters the grid; its
@@ -447,17 +515,16 @@ fn layers(bits: u64) -> u64 {
     })
 }
 
-/// The profile of a node by those of its children, each of `slices` slices.
-fn profile(node: &Node, below: &[u64], slices: usize) -> u64 {
+/// The profile of a node with these masks by those of its children, each of `slices` slices.
+fn profile([mixed, full]: [u64; 2], below: &[u64], slices: usize) -> u64 {
     let all = u64::MAX >> (SLICES - slices);
     let mut quarters = [0u64; 4];
-    let mut next = node.first as usize;
+    let mut below = below.iter();
     for child in 0..64 {
         let quarter = &mut quarters[places(child)[2]];
-        if node.mixed >> child & 1 == 1 {
-            *quarter |= below[next];
-            next += 1;
-        } else if node.full >> child & 1 == 1 {
+        if mixed >> child & 1 == 1 {
+            *quarter |= below.next().copied().unwrap_or(0);
+        } else if full >> child & 1 == 1 {
             *quarter |= all;
         }
     }

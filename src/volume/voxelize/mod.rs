@@ -12,6 +12,7 @@
 mod dense;
 mod fill;
 mod lattice;
+mod lazy;
 mod lines;
 mod near_lines;
 mod octants;
@@ -24,6 +25,7 @@ mod triangle;
 mod winding;
 
 pub use lattice::Lattice;
+pub use lazy::{Extent, Lazy};
 pub use overlap::touches;
 pub use trade::TRADE;
 pub use triangle::Triangle;
@@ -527,18 +529,17 @@ impl Stats {
 
     /// Octree nodes made against the nodes of the full tree.
     pub fn modelled(&self) -> Modelled {
-        let longest = self.dims.iter().copied().max().unwrap_or(1).max(1);
-        let levels = longest.next_power_of_two().trailing_zeros();
-        let full = (0..=levels)
-            .map(|l| {
-                self.dims
-                    .map(|d| d.div_ceil(1 << l))
-                    .iter()
-                    .product::<u64>()
-            })
-            .sum();
+        let full = full_nodes(self.dims);
         Modelled::new("octree nodes", self.octree_nodes, full, self.held_bytes)
     }
+}
+
+/// Nodes of all levels of the full octree of a grid, voxels included.
+fn full_nodes(dims: [u64; 3]) -> u64 {
+    let longest = dims.into_iter().fold(1, u64::max);
+    let levels = longest.next_power_of_two().trailing_zeros();
+    let level = |l: u32| dims.map(|d| d.div_ceil(1 << l)).iter().product::<u64>();
+    (0..=levels).map(level).sum()
 }
 
 #[cfg(test)]

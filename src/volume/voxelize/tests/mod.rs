@@ -1,6 +1,7 @@
 //! Tests of the voxelizer as a library.
 
 mod exact;
+mod lazy;
 mod properties;
 mod winding;
 
