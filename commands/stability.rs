@@ -8,7 +8,7 @@ use crate::places::Places;
 use crate::progress::{self, Recorder};
 use crate::runs::{self, Document, Runs};
 use crate::shared::{Seed, Wrapping, not_negative, positive};
-use crate::streams::{say, show};
+use crate::streams::{complain, say, show};
 use crate::wrapped::Wrapped;
 use result::{Asked, Outcome, Row, Stats};
 use scantle::error::Result;
@@ -100,10 +100,14 @@ pub fn run(args: &Args) -> Result<Exit> {
         return Ok(runs::refuse("stability", &why));
     };
     let places = Places::new(&args.wrapping, &wrapped.inputs)?;
-    let source = Source::open(name, machine::default_memory())?;
     let format = wrapped.value("input-format");
-    let (mesh, input, _) = io::read_mesh(&source, format.as_deref().and_then(Format::from_name))?;
-    drop(source);
+    let format = format.as_deref().and_then(Format::from_name);
+    let read = Source::open(name, machine::default_memory())
+        .and_then(|source| io::read_mesh(&source, format));
+    let (mesh, input, _) = match read {
+        Ok(read) => read,
+        Err(error) => return Ok(complain(&error, Some(name))),
+    };
     let bench = Bench::new(args, &wrapped, &mesh)?;
     let untouched = match bench.run(&mesh, &Motion::NONE, "untouched") {
         Ok(untouched) => untouched,
