@@ -140,7 +140,7 @@ pub fn run(args: &Args) -> Result<Exit> {
     let exit = judge(&stats, args.max_error);
     let output = places.write(|| result::plot(&stats), || result::exported(&stats))?;
     let asked = Asked::new(&wrapped, args);
-    places.deliver("stability", asked, stats, vec![input], output)?;
+    places.deliver("stability", asked, stats, vec![input], output, Vec::new())?;
     Ok(exit)
 }
 

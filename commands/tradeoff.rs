@@ -112,7 +112,8 @@ pub fn run(args: &Args) -> Result<Exit> {
         || result::exported(&stats),
     )?;
     let exit = judge(&stats, &rows, choice, &limits, talk.quiet);
-    places.deliver("tradeoff", asked, stats, input, output)?;
+    let varies = Stats::varies(&params);
+    places.deliver("tradeoff", asked, stats, input, output, varies)?;
     Ok(exit)
 }
 
