@@ -63,6 +63,7 @@ mod tests {
     use super::*;
     use crate::cli;
     use scantle::io::format::Format;
+    use scantle::trade::Placed;
 
     #[test]
     fn every_command_has_one_row() {
@@ -73,6 +74,28 @@ mod tests {
         there.sort_unstable();
         rows.sort_unstable();
         assert_eq!(there, rows);
+    }
+
+    #[test]
+    fn every_placed_option_takes_as_many_numbers_as_its_parts() {
+        let trades = TABLE.iter().filter_map(|(name, declared)| match declared {
+            Declared::Trade(trade) => Some((*name, *trade)),
+            Declared::None(reason) => {
+                assert!(!reason.is_empty(), "{name}");
+                None
+            }
+        });
+        for (name, trade) in trades {
+            for Placed { option, parts } in trade.placed {
+                let takes = |count: usize| {
+                    let numbers: Vec<String> = (1..=count).map(|n| n.to_string()).collect();
+                    let option = format!("--{option}={}", numbers.join(","));
+                    cli::parse_words(&[name.to_owned(), "a.ply".to_owned(), option]).is_ok()
+                };
+                let count = parts.iter().map(|part| part.numbers()).sum();
+                assert!(takes(count) && !takes(count + 1), "{name} --{option}");
+            }
+        }
     }
 
     #[test]
@@ -97,9 +120,9 @@ mod tests {
                     .get_arguments()
                     .any(|a| a.get_long() == Some(long))
             };
-            let placed = trade.lengths.iter().chain(trade.points);
             let needed = ["verify", "timings", "report", "quiet", "output"];
-            assert!(placed.chain(&needed).all(|long| has(long)), "{name}");
+            assert!(needed.iter().all(|long| has(long)), "{name}");
+            assert!(!trade.reference.is_empty() && !trade.error.name.is_empty());
             let format = Format::from_name(trade.result).expect("a format");
             assert!(format.is_read() && format.is_written(), "{name}");
             for row in trade.invariant {
