@@ -102,7 +102,8 @@ fn grouped(command: &clap::Command) -> String {
 const WRAPPING: &[&str] = &["tradeoff", "stability"];
 
 /// Puts the own options of a command that runs another one first, so that they may stand anywhere:
-/// `tradeoff OWN -- COMMAND REST`. The words of other commands stay as they are.
+/// `tradeoff OWN -- COMMAND REST`, which may be written like that too, where COMMAND has options of
+/// the same names. The words of other commands stay as they are.
 fn sorted(words: Vec<OsString>, definition: &clap::Command) -> Vec<OsString> {
     let name = words.get(1).and_then(|word| word.to_str());
     let Some(wrapper) = name
@@ -117,7 +118,11 @@ fn sorted(words: Vec<OsString>, definition: &clap::Command) -> Vec<OsString> {
     while let Some(word) = words.next() {
         match word.to_str().and_then(|text| own_option(wrapper, text)) {
             _ if word == "--" => {
-                rest.push(word);
+                // In front of the command it parts the own options from its words; after it, it is
+                // one of them.
+                if !rest.is_empty() {
+                    rest.push(word);
+                }
                 rest.extend(words.by_ref());
             }
             None => rest.push(word),
@@ -238,6 +243,10 @@ mod tests {
         assert_eq!(
             sorted("x tradeoff -v voxelize -o b.svo -- --vary"),
             "x tradeoff -v -- voxelize -o b.svo -- --vary"
+        );
+        assert_eq!(
+            sorted("x tradeoff --vary mode -- voxelize a.ply --max-memory 1MiB -q"),
+            "x tradeoff --vary mode -- voxelize a.ply --max-memory 1MiB -q"
         );
         assert_eq!(sorted("x tradeoff --help"), "x tradeoff --help");
         assert_eq!(
