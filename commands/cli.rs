@@ -2,6 +2,7 @@
 
 use crate::exit::Exit;
 use crate::streams::say;
+use crate::trade::{Declared, TABLE};
 use crate::{
     compare, completions, convert, formats, info, man, schema, shadow, stability, tradeoff,
     voxelize,
@@ -65,6 +66,13 @@ pub fn command() -> clap::Command {
     let command = Cli::command()
         .mut_subcommand("convert", |c| c.mut_arg("output", |arg| arg.required(true)))
         .mut_subcommands(|c| c.mut_args(take_negative_numbers));
+    let command = TABLE.iter().fold(command, |command, (name, declared)| {
+        if command.find_subcommand(name).is_none() {
+            // `help` is added by building.
+            return command;
+        }
+        command.mut_subcommand(name, |c| with_trade(c, declared))
+    });
     // Building adds the command `help`, which the list shows too.
     let mut built = command.clone();
     built.build();
@@ -73,6 +81,13 @@ pub fn command() -> clap::Command {
         grouped(&built)
     );
     command.help_template(template)
+}
+
+/// A command whose long help says at the end what it trades for what.
+fn with_trade(command: clap::Command, declared: &Declared) -> clap::Command {
+    let about = command.get_long_about().or(command.get_about());
+    let about = about.map(ToString::to_string).unwrap_or_default();
+    command.long_about(format!("{about}\n\n{}", declared.sentence()))
 }
 
 /// Lets `--option -1` be a value that is out of range, rather than an option that is not known.

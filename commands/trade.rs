@@ -12,6 +12,28 @@ pub enum Declared {
     None(&'static str),
 }
 
+impl Declared {
+    /// What the help of the command says of it.
+    pub fn sentence(&self) -> String {
+        match self {
+            Declared::None(reason) => format!("It has no trade: {reason}."),
+            Declared::Trade(trade) => {
+                let knobs: Vec<String> = trade
+                    .knobs
+                    .iter()
+                    .map(|k| format!("--{}", k.name))
+                    .collect();
+                let (knobs, error, reference) = (knobs.join(", "), trade.error, trade.reference);
+                format!(
+                    "What trades accuracy for time and memory: {knobs}. `scantle tradeoff` compares \
+                     them by one error, verified against {reference}: {} ({}).",
+                    error.name, error.unit
+                )
+            }
+        }
+    }
+}
+
 /// Every command; `tradeoff` and `stability` know no other way to one.
 pub const TABLE: &[(&str, Declared)] = &[
     ("voxelize", Declared::Trade(&voxelize::TRADE)),
@@ -74,6 +96,26 @@ mod tests {
         there.sort_unstable();
         rows.sort_unstable();
         assert_eq!(there, rows);
+    }
+
+    #[test]
+    fn every_help_names_the_trade_or_says_why_there_is_none() {
+        let mut command = cli::command();
+        command.build();
+        for (name, declared) in TABLE.iter().filter(|(name, _)| *name != "help") {
+            let definition = command.find_subcommand(name).expect("a command");
+            let about = definition.get_long_about().map(ToString::to_string);
+            let about = about.unwrap_or_default();
+            match declared {
+                Declared::None(reason) => assert!(about.contains(reason), "{name}"),
+                Declared::Trade(trade) => {
+                    let knobs = trade.knobs.iter().map(|knob| format!("--{}", knob.name));
+                    let others = [trade.error.name, trade.error.unit, trade.reference];
+                    let mut words = knobs.chain(others.map(str::to_owned));
+                    assert!(words.all(|word| about.contains(&word)), "{name}: {about}");
+                }
+            }
+        }
     }
 
     #[test]
