@@ -2,6 +2,7 @@
 
 use crate::exit::Exit;
 use crate::streams::say;
+use crate::trade::{Declared, TABLE};
 use crate::{
     compare, completions, convert, formats, info, man, schema, shadow, stability, tradeoff,
     voxelize,
@@ -65,6 +66,13 @@ pub fn command() -> clap::Command {
     let command = Cli::command()
         .mut_subcommand("convert", |c| c.mut_arg("output", |arg| arg.required(true)))
         .mut_subcommands(|c| c.mut_args(take_negative_numbers));
+    let command = TABLE.iter().fold(command, |command, (name, declared)| {
+        if command.find_subcommand(name).is_none() {
+            // `help` is added by building.
+            return command;
+        }
+        command.mut_subcommand(name, |c| with_trade(c, declared))
+    });
     // Building adds the command `help`, which the list shows too.
     let mut built = command.clone();
     built.build();
@@ -73,6 +81,13 @@ pub fn command() -> clap::Command {
         grouped(&built)
     );
     command.help_template(template)
+}
+
+/// A command whose long help says at the end what it trades for what.
+fn with_trade(command: clap::Command, declared: &Declared) -> clap::Command {
+    let about = command.get_long_about().or(command.get_about());
+    let about = about.map(ToString::to_string).unwrap_or_default();
+    command.long_about(format!("{about}\n\n{}", declared.sentence()))
 }
 
 /// Lets `--option -1` be a value that is out of range, rather than an option that is not known.
@@ -102,7 +117,8 @@ fn grouped(command: &clap::Command) -> String {
 const WRAPPING: &[&str] = &["tradeoff", "stability"];
 
 /// Puts the own options of a command that runs another one first, so that they may stand anywhere:
-/// `tradeoff OWN -- COMMAND REST`. The words of other commands stay as they are.
+/// `tradeoff OWN -- COMMAND REST`, which may be written like that too, where COMMAND has options of
+/// the same names. The words of other commands stay as they are.
 fn sorted(words: Vec<OsString>, definition: &clap::Command) -> Vec<OsString> {
     let name = words.get(1).and_then(|word| word.to_str());
     let Some(wrapper) = name
@@ -117,7 +133,11 @@ fn sorted(words: Vec<OsString>, definition: &clap::Command) -> Vec<OsString> {
     while let Some(word) = words.next() {
         match word.to_str().and_then(|text| own_option(wrapper, text)) {
             _ if word == "--" => {
-                rest.push(word);
+                // In front of the command it parts the own options from its words; after it, it is
+                // one of them.
+                if !rest.is_empty() {
+                    rest.push(word);
+                }
                 rest.extend(words.by_ref());
             }
             None => rest.push(word),
@@ -238,6 +258,10 @@ mod tests {
         assert_eq!(
             sorted("x tradeoff -v voxelize -o b.svo -- --vary"),
             "x tradeoff -v -- voxelize -o b.svo -- --vary"
+        );
+        assert_eq!(
+            sorted("x tradeoff --vary mode -- voxelize a.ply --max-memory 1MiB -q"),
+            "x tradeoff --vary mode -- voxelize a.ply --max-memory 1MiB -q"
         );
         assert_eq!(sorted("x tradeoff --help"), "x tradeoff --help");
         assert_eq!(

@@ -26,8 +26,9 @@ use serde_json::Value;
 /// the same size: the pixels that differ, the largest difference of a channel, PSNR and SSIM.
 /// Reports, or any other JSON: what differs, each place named by its JSON pointer, and the largest
 /// relative difference of two numbers. JSON Lines are compared document by document. Of two reports
-/// of scantle, what depends on the run and not on the result is left out: the block `run`, and the
-/// `path` of each input and output.
+/// of scantle, what depends on the run and not on the result is left out: the block `run`, the
+/// `path` of each input and output, and what both reports list in `varies`, such as the seconds that
+/// `tradeoff` measures.
 #[derive(Debug, clap::Args)]
 #[command(after_long_help = EXAMPLES)]
 pub struct Args {
@@ -45,7 +46,7 @@ pub struct Args {
     /// Points spread over each mesh for mean and root mean square
     #[arg(long, value_name = "N", default_value_t = mesh_distance::Params::DEFAULT.samples)]
     samples: u64,
-    /// Compare reports whole: `run` and paths too
+    /// Compare reports whole: `run`, paths and what they list in `varies` too
     #[arg(long)]
     everything: bool,
     #[command(flatten)]

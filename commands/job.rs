@@ -321,6 +321,7 @@ impl<'a> Job<'a> {
             accuracy: found.accuracy,
             modelled: found.modelled,
             warnings: self.warnings,
+            varies: Vec::new(),
             run,
         };
         let exit = failure.map_or(Exit::Done, |_| Exit::CheckFailed);

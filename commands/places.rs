@@ -79,7 +79,7 @@ impl Places {
         Ok(written)
     }
 
-    /// Writes the report.
+    /// Writes the report; `varies` names what of it does from run to run.
     pub fn deliver<P: Serialize, R: Serialize>(
         &self,
         command: &str,
@@ -87,6 +87,7 @@ impl Places {
         result: R,
         input: Vec<Input>,
         output: Vec<Output>,
+        varies: Vec<&'static str>,
     ) -> Result<()> {
         let report = Report {
             schema: SCHEMA,
@@ -99,6 +100,7 @@ impl Places {
             accuracy: None,
             modelled: None,
             warnings: Vec::new(),
+            varies,
             run: None,
         };
         let document = words::json(&report, true);

@@ -8,11 +8,11 @@ use crate::places::Places;
 use crate::progress::{self, Recorder};
 use crate::runs::{self, Document, Runs};
 use crate::shared::{Seed, Wrapping, not_negative, positive};
-use crate::streams::{say, show};
+use crate::streams::{complain, say, show};
 use crate::wrapped::Wrapped;
 use result::{Asked, Outcome, Row, Stats};
 use scantle::error::Result;
-use scantle::io::format::Format;
+use scantle::io::format::{Format, Kind};
 use scantle::io::sink::Sink;
 use scantle::io::source::Source;
 use scantle::io::{self, Content};
@@ -22,6 +22,7 @@ use scantle::measure::stability::{
 use scantle::measure::tradeoff::Failed;
 use scantle::mesh::Mesh;
 use scantle::progress::Progress;
+use scantle::trade::Placed;
 use std::path::PathBuf;
 use tempfile::TempDir;
 
@@ -41,7 +42,7 @@ pub struct Args {
     #[command(flatten)]
     wrapping: Wrapping,
     /// Exit with 1 when the drift under a change that counts is larger than X, in the unit of the
-    /// input; 0 lets nothing change at all
+    /// command's own error; 0 lets nothing change at all
     #[arg(long, value_name = "X", value_parser = not_negative)]
     max_error: Option<f64>,
     /// Powers of two to scale by, as exponents from -1000 to 1000
@@ -79,7 +80,8 @@ fn offsets(text: &str) -> Result<Offsets, String> {
 const USAGE: &str = "scantle stability COMMAND INPUT [OPTIONS]";
 
 const AFTER: &str = "\
-Options of the command that are lengths or points are moved with the input.
+Options of the command that are lengths, points, directions or boxes are moved with the input. A
+picture is turned only where its --light and --camera are given, and turn along.
 
 Examples:
   scantle stability voxelize fixtures/shapes/torus-knot.ply --resolution 24 --max-error 0
@@ -100,10 +102,14 @@ pub fn run(args: &Args) -> Result<Exit> {
         return Ok(runs::refuse("stability", &why));
     };
     let places = Places::new(&args.wrapping, &wrapped.inputs)?;
-    let source = Source::open(name, machine::default_memory())?;
     let format = wrapped.value("input-format");
-    let (mesh, input, _) = io::read_mesh(&source, format.as_deref().and_then(Format::from_name))?;
-    drop(source);
+    let format = format.as_deref().and_then(Format::from_name);
+    let read = Source::open(name, machine::default_memory())
+        .and_then(|source| io::read_mesh(&source, format));
+    let (mesh, input, _) = match read {
+        Ok(read) => read,
+        Err(error) => return Ok(complain(&error, Some(name))),
+    };
     let bench = Bench::new(args, &wrapped, &mesh)?;
     let untouched = match bench.run(&mesh, &Motion::NONE, "untouched") {
         Ok(untouched) => untouched,
@@ -127,7 +133,8 @@ pub fn run(args: &Args) -> Result<Exit> {
     }
     recorder.finish();
     let in_space = !matches!(untouched.content, Content::Image(_));
-    let stats = Stats::new(&mesh, untouched.bound, in_space, rows);
+    let unit = wrapped.trade.error.unit;
+    let stats = Stats::new(&mesh, untouched.bound, unit, in_space, rows);
     let table = result::table(&stats);
     if !talk.quiet {
         show(&table.aligned());
@@ -136,7 +143,7 @@ pub fn run(args: &Args) -> Result<Exit> {
     let exit = judge(&stats, args.max_error);
     let output = places.write(|| result::plot(&stats), || result::exported(&stats))?;
     let asked = Asked::new(&wrapped, args);
-    places.deliver("stability", asked, stats, vec![input], output)?;
+    places.deliver("stability", asked, stats, vec![input], output, Vec::new())?;
     Ok(exit)
 }
 
@@ -196,47 +203,44 @@ impl<'a> Bench<'a> {
         self.folder.path().join(format!("{name}.{}", format.name()))
     }
 
-    /// The options that are places, moved.
+    /// The options that stand in the input's space, moved; with `undo`, moved and taken back, which
+    /// leaves the rounding of their far place.
     fn options(
         &self,
         motion: &Motion,
         undo: bool,
     ) -> Result<Vec<(String, Option<String>)>, String> {
-        let moved = |numbers: &[f64], is_length: bool| -> Result<Vec<f64>, String> {
-            let there: Vec<f64> = if is_length {
-                numbers.iter().map(|n| motion.length(*n)).collect()
-            } else {
-                motion.place(numbers)?
-            };
-            if !undo {
-                return Ok(there);
-            }
-            // As the moved options are, but at their old place.
-            Ok(if is_length {
-                there
-                    .iter()
-                    .map(|n| n * 2f64.powi(-motion.exponent))
-                    .collect()
-            } else {
-                let back = there.chunks(3).map(|p| motion.undo([p[0], p[1], p[2]]));
-                back.flatten().collect()
-            })
-        };
-        let trade = self.wrapped.trade;
-        let lengths = trade.lengths.iter().map(|name| (*name, true));
         let mut options = Vec::new();
-        for (name, is_length) in lengths.chain(trade.points.iter().map(|name| (*name, false))) {
-            let Some(value) = self.wrapped.value(name) else {
-                continue;
-            };
-            let numbers: Result<Vec<f64>, _> = value.split(',').map(|n| n.trim().parse()).collect();
-            let numbers =
-                numbers.map_err(|_| format!("--{name} {value} has something that is no number"))?;
-            let there = moved(&numbers, is_length).map_err(|why| format!("--{name}: {why}"))?;
-            let there: Vec<String> = there.iter().map(|n| format!("{n:?}")).collect();
-            options.push((name.to_owned(), Some(there.join(","))));
+        for Placed { option, parts } in self.wrapped.trade.placed {
+            for value in self.wrapped.values(option) {
+                let wrong = |why: String| format!("--{option} {value}: {why}");
+                let numbers = value.split(',').map(|n| n.trim().parse());
+                let numbers: Result<Vec<f64>, _> = numbers.collect();
+                let numbers = numbers.map_err(|_| wrong("something is no number".to_owned()))?;
+                let mut placed = motion.place(parts, &numbers).map_err(wrong)?;
+                if undo {
+                    placed = motion.place_back(parts, &placed).map_err(wrong)?;
+                }
+                let words: Vec<String> = placed.iter().map(|n| format!("{n:?}")).collect();
+                options.push(((*option).to_owned(), Some(words.join(","))));
+            }
         }
         Ok(options)
+    }
+
+    /// Why a motion shows another result than the one untouched, where it does.
+    ///
+    /// What is seen of a model that turns stays the same only where all that looks and shines turns
+    /// along; what the command places by itself does not.
+    fn is_another(&self, motion: &Motion) -> Option<String> {
+        if motion.turn == Motion::NONE.turn || self.format.kind() != Kind::Image {
+            return None;
+        }
+        let placed = self.wrapped.trade.placed.iter();
+        let free = placed.filter(|placed| !self.wrapped.is_set(placed.option));
+        let free: Vec<String> = free.map(|placed| format!("--{}", placed.option)).collect();
+        let needed = free.join(" and ");
+        (!free.is_empty()).then(|| format!("shows another side without {needed}"))
     }
 
     /// Runs the command on a mesh, with its places moved.
@@ -294,6 +298,9 @@ impl<'a> Bench<'a> {
             Ok(changed) => changed,
             Err(why) => return row.skipped(why),
         };
+        if let Some(why) = self.is_another(&changed.motion) {
+            return row.skipped(why);
+        }
         row.rounding(changed.rounding);
         match self.drifts(&changed, untouched) {
             Ok((drift, by_input)) => row.done(drift, by_input),

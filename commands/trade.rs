@@ -12,6 +12,28 @@ pub enum Declared {
     None(&'static str),
 }
 
+impl Declared {
+    /// What the help of the command says of it.
+    pub fn sentence(&self) -> String {
+        match self {
+            Declared::None(reason) => format!("It has no trade: {reason}."),
+            Declared::Trade(trade) => {
+                let knobs: Vec<String> = trade
+                    .knobs
+                    .iter()
+                    .map(|k| format!("--{}", k.name))
+                    .collect();
+                let (knobs, error, reference) = (knobs.join(", "), trade.error, trade.reference);
+                format!(
+                    "What trades accuracy for time and memory: {knobs}. `scantle tradeoff` compares \
+                     them by one error, verified against {reference}: {} ({}).",
+                    error.name, error.unit
+                )
+            }
+        }
+    }
+}
+
 /// Every command; `tradeoff` and `stability` know no other way to one.
 pub const TABLE: &[(&str, Declared)] = &[
     ("voxelize", Declared::Trade(&voxelize::TRADE)),
@@ -63,6 +85,7 @@ mod tests {
     use super::*;
     use crate::cli;
     use scantle::io::format::Format;
+    use scantle::trade::Placed;
 
     #[test]
     fn every_command_has_one_row() {
@@ -73,6 +96,48 @@ mod tests {
         there.sort_unstable();
         rows.sort_unstable();
         assert_eq!(there, rows);
+    }
+
+    #[test]
+    fn every_help_names_the_trade_or_says_why_there_is_none() {
+        let mut command = cli::command();
+        command.build();
+        for (name, declared) in TABLE.iter().filter(|(name, _)| *name != "help") {
+            let definition = command.find_subcommand(name).expect("a command");
+            let about = definition.get_long_about().map(ToString::to_string);
+            let about = about.unwrap_or_default();
+            match declared {
+                Declared::None(reason) => assert!(about.contains(reason), "{name}"),
+                Declared::Trade(trade) => {
+                    let knobs = trade.knobs.iter().map(|knob| format!("--{}", knob.name));
+                    let others = [trade.error.name, trade.error.unit, trade.reference];
+                    let mut words = knobs.chain(others.map(str::to_owned));
+                    assert!(words.all(|word| about.contains(&word)), "{name}: {about}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn every_placed_option_takes_as_many_numbers_as_its_parts() {
+        let trades = TABLE.iter().filter_map(|(name, declared)| match declared {
+            Declared::Trade(trade) => Some((*name, *trade)),
+            Declared::None(reason) => {
+                assert!(!reason.is_empty(), "{name}");
+                None
+            }
+        });
+        for (name, trade) in trades {
+            for Placed { option, parts } in trade.placed {
+                let takes = |count: usize| {
+                    let numbers: Vec<String> = (1..=count).map(|n| n.to_string()).collect();
+                    let option = format!("--{option}={}", numbers.join(","));
+                    cli::parse_words(&[name.to_owned(), "a.ply".to_owned(), option]).is_ok()
+                };
+                let count = parts.iter().map(|part| part.numbers()).sum();
+                assert!(takes(count) && !takes(count + 1), "{name} --{option}");
+            }
+        }
     }
 
     #[test]
@@ -97,9 +162,9 @@ mod tests {
                     .get_arguments()
                     .any(|a| a.get_long() == Some(long))
             };
-            let placed = trade.lengths.iter().chain(trade.points);
             let needed = ["verify", "timings", "report", "quiet", "output"];
-            assert!(placed.chain(&needed).all(|long| has(long)), "{name}");
+            assert!(needed.iter().all(|long| has(long)), "{name}");
+            assert!(!trade.reference.is_empty() && !trade.error.name.is_empty());
             let format = Format::from_name(trade.result).expect("a format");
             assert!(format.is_read() && format.is_written(), "{name}");
             for row in trade.invariant {

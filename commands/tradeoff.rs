@@ -26,9 +26,10 @@ use vary::Knobs;
 /// fro over all settings, so that a machine that slows down does so for all alike. Marks the
 /// settings that no other beats in both cost and error.
 ///
-/// The own options may stand anywhere; all other words are the command's. A setting that fails is a
-/// line of the table like any other. Times and memory are those of the command's own `run` block,
-/// so starting it costs nothing here; they vary from run to run, the errors do not.
+/// The own options may stand anywhere; all other words are the command's, and so are those after
+/// `--` in front of the command. A setting that fails is a line of the table like any other. Times
+/// and memory are those of the command's own `run` block, so starting it costs nothing here; they
+/// vary from run to run, the errors do not.
 #[derive(Debug, clap::Args)]
 #[command(after_long_help = AFTER, override_usage = USAGE)]
 pub struct Args {
@@ -66,8 +67,9 @@ pub struct Args {
 const USAGE: &str = "scantle tradeoff COMMAND INPUT... --vary KNOB[=A,B,...]... [OPTIONS]";
 
 const AFTER: &str = "\
-The runs themselves may take what the command takes by default; --max-memory chooses among them.
-Where verifying takes more memory than there is, the setting is a line that says so.
+The runs themselves may take what the command takes by default; --max-memory chooses among them. To
+set the command's own limit, write `tradeoff --vary KNOB -- COMMAND INPUT --max-memory SIZE`. Where
+verifying would take more, the setting is a line that says so.
 
 Examples:
   scantle tradeoff voxelize fixtures/shapes/torus-knot.ply --vary resolution=8,16,32 --vary mode
@@ -112,7 +114,8 @@ pub fn run(args: &Args) -> Result<Exit> {
         || result::exported(&stats),
     )?;
     let exit = judge(&stats, &rows, choice, &limits, talk.quiet);
-    places.deliver("tradeoff", asked, stats, input, output)?;
+    let varies = Stats::varies(&params);
+    places.deliver("tradeoff", asked, stats, input, output, varies)?;
     Ok(exit)
 }
 

@@ -88,7 +88,14 @@ impl Wrapped {
 
     /// The value of an option, as given or by default.
     pub fn value(&self, option: &str) -> Option<String> {
-        self.raw(self.arg(option)?).into_iter().next()
+        self.values(option).into_iter().next()
+    }
+
+    /// All values of an option that may be given several times.
+    pub fn values(&self, option: &str) -> Vec<String> {
+        self.arg(option)
+            .map(|arg| self.raw(arg))
+            .unwrap_or_default()
     }
 
     /// The options that the user gave, each with its value where it takes one.

@@ -33,9 +33,22 @@ pub struct Report<P, R> {
     pub modelled: Option<Modelled>,
     /// What looks wrong but could be worked with.
     pub warnings: Vec<Warning>,
+    /// Members of this report that vary from run to run, beside [`VARIES`] and in the same form.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub varies: Vec<&'static str>,
     /// What varies from run to run; only with `--timings`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub run: Option<Run>,
+}
+
+/// Members of every report that depend on the run and not on the result, as JSON pointers
+/// (RFC 6901) in which `*` stands for each element of an array.
+pub const VARIES: &[&str] = &["/run", "/input/*/path", "/output/*/path"];
+
+/// The members that a report states to vary, beside [`VARIES`].
+pub fn stated_to_vary(report: &Value) -> impl Iterator<Item = &str> {
+    let stated = report.get("varies").and_then(Value::as_array);
+    stated.into_iter().flatten().filter_map(Value::as_str)
 }
 
 /// A file that was read.

@@ -14,11 +14,8 @@ pub struct Trade {
     pub reference: &'static str,
     /// Name of the format that holds every result without loss.
     pub result: &'static str,
-    /// Options whose value is a length in the input's unit; they are scaled with it.
-    pub lengths: &'static [&'static str],
-    /// Options whose value is a point of the input's space (three numbers) or a box along its axes
-    /// (six: lower corner, then upper); they are moved with it.
-    pub points: &'static [&'static str],
+    /// Options whose values stand in the input's space; they are moved with it.
+    pub placed: &'static [Placed],
     /// What the result does not depend on.
     pub invariant: &'static [Invariance],
 }
@@ -33,6 +30,41 @@ pub struct Knob {
     /// Whether its values are numbers, of which the smaller are cheaper; else they are names, and
     /// what the ladder leaves out is cheaper than all of it.
     pub numeric: bool,
+}
+
+/// An option whose value stands in the input's space.
+#[derive(Debug, Clone, Copy)]
+pub struct Placed {
+    /// The long option, without dashes. Where it may be given several times, each value is moved.
+    pub option: &'static str,
+    /// What its comma-separated numbers are, in order.
+    pub parts: &'static [Part],
+}
+
+/// What some numbers of an option's value are, in the input's space.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Part {
+    /// One number: a length in the input's unit.
+    Length,
+    /// Three: a point.
+    Point,
+    /// Three: a direction, whose length says nothing.
+    Direction,
+    /// Six: a box along the axes, its lower corner, then its upper.
+    Box,
+    /// One: what no motion changes, such as an angle.
+    Number,
+}
+
+impl Part {
+    /// How many numbers it takes.
+    pub const fn numbers(self) -> usize {
+        match self {
+            Part::Length | Part::Number => 1,
+            Part::Point | Part::Direction => 3,
+            Part::Box => 6,
+        }
+    }
 }
 
 /// A measure of the report's `accuracy`.

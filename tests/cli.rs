@@ -1,6 +1,6 @@
 //! What every command promises: exit codes, streams, options.
 
-use crate::support::{Workplace, ran};
+use crate::support::{Workplace, packed, ran};
 use std::fs::{self, File};
 use std::io::Read;
 use std::os::unix::fs::PermissionsExt;
@@ -104,6 +104,68 @@ fn exit_4_in_a_folder_that_cannot_be_written() {
     let ran = place.run("convert fixtures/shapes/cube.obj -o locked/cube.ply");
     assert_eq!(ran.code, if refused { 4 } else { 0 }, "{}", ran.stderr);
     fs::set_permissions(&locked, fs::Permissions::from_mode(0o755)).expect("permissions");
+}
+
+/// A document that places one mesh of a point many times.
+fn instances(nodes: usize) -> String {
+    let nodes = vec!["{\"mesh\":0}"; nodes].join(",");
+    format!(
+        "{{\"asset\":{{\"version\":\"2.0\"}},\"nodes\":[{nodes}],\
+         \"meshes\":[{{\"primitives\":[{{\"attributes\":{{\"POSITION\":0}},\"mode\":0}}]}}],\
+         \"accessors\":[{{\"componentType\":5126,\"type\":\"VEC3\",\"count\":1,\"bufferView\":0}}],\
+         \"bufferViews\":[{{\"buffer\":0,\"byteLength\":12}}],\
+         \"buffers\":[{{\"byteLength\":12,\"uri\":\"data:application/octet-stream;base64,\
+         AAAAAAAAAAAAAAAA\"}}]}}"
+    )
+}
+
+#[test]
+fn every_reader_that_makes_more_than_it_may_ends_with_5() {
+    let place = Workplace::new();
+    place.put("a.json", format!("[{}0]", "0,".repeat(100_000)));
+    place.put("instances.gltf", instances(20_000));
+    place.put("zeros.raw", vec![0; 2 << 20]);
+    let header = "NRRD0004\ntype: uint8\ndimension: 3\nsizes: 128 128 128\nencoding: raw\n";
+    place.put("beside.nhdr", format!("{header}data file: zeros.raw\n"));
+    let mut plain = format!("{header}\n").into_bytes();
+    plain.resize(plain.len() + (2 << 20), 0);
+    place.put("plain.nrrd", plain);
+    place.put("packed.ply.gz", packed(&vec![b' '; 2 << 20]));
+    for name in ["b.nrrd", "b.mha", "b.npy", "b.binvox"] {
+        let line = format!("voxelize {CUBE} --resolution 254 --pad 1 -o {name} --report r.json -q");
+        assert_eq!(place.run(&line).code, 0);
+    }
+    for name in [
+        "a.json",
+        "instances.gltf",
+        "beside.nhdr",
+        "plain.nrrd",
+        "packed.ply.gz",
+        "b.nrrd",
+        "b.mha",
+        "b.npy",
+        "b.binvox",
+        "fixtures/pictures/torus-knot.png",
+    ] {
+        let line = format!("info {name} --max-memory 1MiB");
+        let ran = place.run(&line);
+        assert_eq!(ran.code, 5, "{line}: {}", ran.stderr);
+        assert!(ran.stdout.is_empty(), "{line}");
+        let [problem, hint] = ran.stderr.lines().collect::<Vec<_>>()[..] else {
+            panic!("{line}: two lines, not {}", ran.stderr);
+        };
+        assert!(
+            problem.starts_with(&format!("scantle: {name}: ")),
+            "{problem}"
+        );
+        let end = " bytes, over the limit of 1048576 bytes";
+        assert!(problem.ends_with(end), "{problem}");
+        assert!(hint.starts_with("  raise --max-memory, or "), "{hint}");
+        if name != "packed.ply.gz" {
+            let ran = place.run(&format!("info {name} --max-memory 1GiB"));
+            assert_eq!(ran.code, 0, "{name}: {}", ran.stderr);
+        }
+    }
 }
 
 #[test]

@@ -2,11 +2,12 @@
 //!
 //! `cmd` holds the words after `scantle`, as if run from the repository root (what it writes goes
 //! to a temporary folder); `report.json` what it prints; `stderr` and `code` how it ends, where
-//! that is not with 0. A run that fails leaves nothing behind. `UPDATE_GOLDEN=1 cargo test golden` rewrites them; read the difference like
-//! code.
+//! that is not with 0. What a report lists in `varies` is masked. A run that fails leaves nothing
+//! behind. `UPDATE_GOLDEN=1 cargo test golden` rewrites them; read the difference like code.
 
 use crate::support::{Ran, Workplace, json, root, updating};
 use jsonschema::Validator;
+use scantle::report::stated_to_vary;
 use serde_json::Value;
 use std::collections::BTreeMap;
 use std::fs;
@@ -89,7 +90,8 @@ fn differences(case: &Path, ran: &Ran) -> Vec<String> {
         let (want, got) = (kept(case, "stderr"), &ran.stderr);
         found.push(format!("standard error\n{want}became\n{got}"));
     }
-    let (want, got) = (json::documents(&kept(case, "report.json")), ran.documents());
+    let got: Vec<Value> = ran.documents().into_iter().map(masked).collect();
+    let want = json::documents(&kept(case, "report.json"));
     if want.len() != got.len() {
         found.push(format!("{} reports became {}", want.len(), got.len()));
     }
@@ -99,11 +101,49 @@ fn differences(case: &Path, ran: &Ran) -> Vec<String> {
     found
 }
 
+/// A report with a word in place of all that it says to vary from run to run.
+fn masked(mut report: Value) -> Value {
+    let stated: Vec<String> = stated_to_vary(&report).map(str::to_owned).collect();
+    for pointer in &stated {
+        let tokens: Vec<&str> = pointer.split('/').skip(1).collect();
+        mask(&mut report, &tokens);
+    }
+    report
+}
+
+fn mask(value: &mut Value, tokens: &[&str]) {
+    match (tokens, value) {
+        ([], value) => *value = "varies".into(),
+        (["*", rest @ ..], Value::Array(items)) => {
+            items.iter_mut().for_each(|item| mask(item, rest));
+        }
+        ([key, rest @ ..], Value::Object(members)) => {
+            if let Some(member) = members.get_mut(*key) {
+                mask(member, rest);
+            }
+        }
+        (tokens, other) => panic!("{tokens:?} leads nowhere in {other}"),
+    }
+}
+
+/// What is kept of the reports: as they were printed, where nothing varies.
+fn printed(ran: &Ran) -> String {
+    let reports = ran.documents();
+    if reports
+        .iter()
+        .all(|report| stated_to_vary(report).count() == 0)
+    {
+        return ran.text();
+    }
+    let masked = reports.into_iter().map(masked);
+    masked.map(|report| format!("{report:#}\n")).collect()
+}
+
 fn rewrite(case: &Path, ran: &Ran) {
     let code = format!("{}\n", ran.code);
     let failed = ran.code != 0;
     let files = [
-        ("report.json", ran.text(), !ran.stdout.is_empty()),
+        ("report.json", printed(ran), !ran.stdout.is_empty()),
         ("code", code, failed),
         ("stderr", ran.stderr.clone(), failed),
     ];

@@ -5,6 +5,7 @@ use scantle::measure::mesh_distance;
 use scantle::measure::stability::Step;
 use scantle::mesh::Mesh;
 use scantle::progress::Silent;
+use scantle::trade::Change;
 use scantle::volume::bits::BitGrid;
 use scantle::volume::voxelize::{Fill, Mode, Params, Size, voxelize};
 
@@ -30,11 +31,11 @@ fn soup() -> impl Strategy<Value = Mesh> {
 
 fn elements() -> impl Strategy<Value = Step> {
     prop::sample::select(vec![
-        Step::VertexOrder,
-        Step::FaceOrder,
-        Step::SplitVertices,
-        Step::DuplicateFaces,
-        Step::DegenerateFaces,
+        Step::Plain(Change::VertexOrder),
+        Step::Plain(Change::FaceOrder),
+        Step::Plain(Change::SplitVertices),
+        Step::Plain(Change::DuplicateFaces),
+        Step::Plain(Change::DegenerateFaces),
     ])
 }
 
@@ -82,7 +83,7 @@ proptest! {
         seed in any::<u64>(),
     ) {
         // Two surfaces at one place wind twice.
-        let fill = if step == Step::DuplicateFaces { Fill::None } else { fill };
+        let fill = if step == Step::Plain(Change::DuplicateFaces) { Fill::None } else { fill };
         let changed = step.apply(&mesh, seed).expect("a mesh");
         prop_assert_eq!(&changed.rounded, &None);
         prop_assert!(bits(&changed.mesh, mode, fill) == bits(&mesh, mode, fill));

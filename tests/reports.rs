@@ -72,23 +72,23 @@ fn json_that_does_not_fit_is_refused() {
     place.put("list.json", format!("[{}0]", "0,".repeat(100_000)));
     place.put("lines.jsonl", "0\n".repeat(100_000));
     for (name, at) in [
-        ("list.json", "1: column "),
-        ("lines.jsonl", "7282: column "),
+        ("list.json", "line 1, column "),
+        ("lines.jsonl", "line 7282, column "),
     ] {
         let ran = place.run(&format!("info {name} --max-memory 1MiB"));
-        assert_eq!(ran.code, 3, "{}", ran.stderr);
+        assert_eq!(ran.code, 5, "{}", ran.stderr);
         let [problem, hint] = ran.stderr.lines().collect::<Vec<_>>()[..] else {
             panic!("two lines, not {}", ran.stderr);
         };
         assert!(
-            problem.starts_with(&format!("scantle: {name}:{at}")),
+            problem.starts_with(&format!("scantle: {name}: the text up to {at}")),
             "{problem}"
         );
         assert!(
             problem.ends_with(" bytes, over the limit of 1048576 bytes"),
             "{problem}"
         );
-        assert_eq!(hint, "  raise --max-memory");
+        assert_eq!(hint, "  raise --max-memory, or make the input smaller");
         let ran = place.run(&format!("info {name} --max-memory 64MiB"));
         assert_eq!(ran.code, 0, "{}", ran.stderr);
     }

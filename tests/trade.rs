@@ -194,6 +194,67 @@ fn one_process_finds_the_errors_of_many() {
 }
 
 #[test]
+fn two_runs_of_one_grid_compare_equal_but_for_what_varies() {
+    let place = Workplace::new();
+    let grid = format!("voxelize {KNOT} --vary resolution=8,16 --vary mode --repeat 2");
+    let shadow = "shadow fixtures/shapes/torus.obj --size 24x16 --vary rays=1,2 --resolution 16";
+    for line in [
+        format!("tradeoff {grid} --max-error 0.5 --plot p.svg --csv t.csv -q"),
+        format!("tradeoff {grid} --budget 0.05 -q"),
+        format!("tradeoff {shadow} --repeat 1 --in-process -q"),
+        format!("stability voxelize {KNOT} --resolution 12 --in-process -q"),
+    ] {
+        for name in ["a.json", "b.json"] {
+            let ran = place.run(&format!("{line} --report {name}"));
+            assert_eq!(ran.code, 0, "{line}: {}", ran.stderr);
+        }
+        let ran = place.run("compare a.json b.json --tolerance 0");
+        assert_eq!(ran.code, 0, "{line}: {}", ran.stderr);
+        let whole = place.run("compare a.json b.json --tolerance 0 --everything");
+        let varies = line.starts_with("tradeoff");
+        assert_eq!(whole.code, i32::from(varies), "{line}: {}", whole.stderr);
+        // Another result does not hide behind what varies.
+        let text = fs::read_to_string(place.path("b.json")).expect("a report");
+        place.put("b.json", text.replace("\"rows\"", "\"lines\""));
+        assert_eq!(place.run("compare a.json b.json --tolerance 0").code, 1);
+    }
+}
+
+#[test]
+fn lights_and_cameras_move_with_the_model() {
+    let place = Workplace::new();
+    let scene = "--light 3,-4,6,0.25 --light=-2,5,3,1 --camera 4,-3,2,0.1,0,0,0,0,1,50";
+    let figures = |scene: &str| {
+        let ran = place.run(&format!(
+            "stability shadow fixtures/shapes/torus.obj --size 40x30 --resolution 24 --rays 4 {scene} --in-process --max-error 0 -q --csv s.csv"
+        ));
+        assert_eq!((ran.code, ran.stderr.as_str()), (0, ""), "{scene}");
+        ran.document()
+    };
+    let report = figures(scene);
+    assert_eq!(report["result"]["unit"], "share of the light");
+    let unchanged = &report["result"]["unchanged"];
+    assert_eq!(unchanged["smallest_scale"], -100);
+    assert_eq!(unchanged["largest_scale"], 100);
+    assert_eq!(unchanged["offset"], 1e9);
+    let of_turns = |report: &Value| -> Vec<Value> {
+        let turns = rows(report).iter();
+        let turns = turns.filter(|row| row["change"] == "turn" || row["change"] == "quarter-turn");
+        turns.cloned().collect()
+    };
+    // A picture whose lights and camera were left behind would be of something else.
+    for row in of_turns(&report) {
+        assert_eq!(row["status"], "done", "{row}");
+        let pixels = row["drift"].as_f64();
+        assert!(pixels.is_some(), "{row}");
+    }
+    for row in of_turns(&figures("--light 3,-4,6,0.25")) {
+        assert_eq!(row["status"], "skipped", "{row}");
+        assert_eq!(row["message"], "shows another side without --camera");
+    }
+}
+
+#[test]
 fn what_cannot_be_varied_is_refused_with_words() {
     for (line, why) in [
         (

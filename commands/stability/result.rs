@@ -49,6 +49,8 @@ impl Asked {
 pub struct Stats {
     /// Longest side of the input's box, in its unit.
     extent: f64,
+    /// The unit of drifts and of the bound, which is that of the command's own error.
+    unit: &'static str,
     /// The proven bound on the command's own error, to judge drifts by; null where there is none.
     error_bound: Option<f64>,
     /// The largest drift under the changes that the command is promised to bear; null where one of
@@ -79,7 +81,8 @@ impl Outcome {
     pub const SKIPPED: u8 = 255;
 }
 
-/// A change, and how far the result drifted. Lengths are in the input's unit.
+/// A change, and how far the result drifted. Drifts are in the unit of the whole, other lengths in the
+/// input's.
 #[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct Row {
     /// Name of the change.
@@ -183,7 +186,14 @@ impl Row {
 }
 
 impl Stats {
-    pub fn new(mesh: &Mesh, bound: Option<f64>, in_space: bool, mut rows: Vec<Row>) -> Self {
+    /// `in_space` says that drifts are lengths, to be shown as shares of the mesh's extent too.
+    pub fn new(
+        mesh: &Mesh,
+        bound: Option<f64>,
+        unit: &'static str,
+        in_space: bool,
+        mut rows: Vec<Row>,
+    ) -> Self {
         let extent = scantle::measure::stability::extent(mesh);
         for row in &mut rows {
             row.drift_relative = row.drift.filter(|_| in_space).map(|drift| drift / extent);
@@ -199,6 +209,7 @@ impl Stats {
         let drifts: Option<Vec<f64>> = counted.map(|row| row.drift).collect();
         Stats {
             extent,
+            unit,
             error_bound: bound,
             drift: drifts.map(|all| all.into_iter().fold(0.0, f64::max)),
             unchanged: reach(0.0),
@@ -216,10 +227,11 @@ impl Stats {
 
 /// The table for people.
 pub fn table(stats: &Stats) -> Table {
+    let drift = format!("drift ({})", stats.unit);
     let headings = [
         "change",
         "by",
-        "drift",
+        &drift,
         "voxels",
         "input moved",
         "ulps",
@@ -316,7 +328,7 @@ pub fn plot(stats: &Stats) -> Plot {
         _ => None,
     };
     let x = Axis::new("power of two", Scale::Linear);
-    let y = Axis::new("drift (file unit)", Scale::Log);
+    let y = Axis::new(format!("drift ({})", stats.unit), Scale::Log);
     let mut plot = Plot::new(
         "Drift of the result against scale and offset of the input",
         x,

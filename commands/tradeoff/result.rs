@@ -50,7 +50,7 @@ impl Asked {
     }
 }
 
-/// What was found. Times and memory vary from run to run, and with them ranks, front and choice.
+/// What was found; [`Stats::varies`] says what of it does from run to run.
 #[derive(Debug, Serialize, JsonSchema)]
 pub struct Stats {
     /// The measure that compares settings.
@@ -120,6 +120,26 @@ pub struct Chosen {
 }
 
 impl Stats {
+    /// What of the report varies from run to run: what is measured by the clock, what follows from
+    /// that, and with a budget which settings were run at all.
+    pub fn varies(params: &Params) -> Vec<&'static str> {
+        let of_rows: &[&str] = match params.budget_s {
+            Some(_) => &["/result/rows"],
+            None => &[
+                "/result/rows/*/wall_s",
+                "/result/rows/*/cpu_s",
+                "/result/rows/*/peak_bytes",
+                "/result/rows/*/rank",
+                "/result/rows/*/on_front",
+            ],
+        };
+        let others = ["/result/front", "/result/choice"];
+        // Plot and table show the times.
+        let written = ["/output/*/bytes", "/output/*/sha256"];
+        let all = of_rows.iter().copied().chain(others).chain(written);
+        all.collect()
+    }
+
     pub fn new(
         wrapped: &Wrapped,
         knobs: &Knobs,

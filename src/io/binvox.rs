@@ -4,6 +4,7 @@
 //! `scale` the edge of the whole cube. Source: Patrick Min, "binvox 3D mesh voxelizer", file format.
 
 use super::header::{Field, Lines, excerpt, join, shortest};
+use super::refusal::{RAISE, Refusal, expect_room};
 use super::samples;
 use crate::error::Fault;
 use crate::io::source::Source;
@@ -24,7 +25,7 @@ const LONGEST_RUN: usize = 255;
 ///
 /// Grids whose dims differ are read too, with `scale` the edge of the longest side. The dims are
 /// measured against what the runs can hold before room is made for them.
-pub fn read(source: &Source, warnings: &mut Vec<Warning>) -> Result<Volume, Fault> {
+pub fn read(source: &Source, warnings: &mut Vec<Warning>) -> Result<Volume, Refusal> {
     let bytes = source.bytes();
     let header = Header::parse(bytes)?;
     // dim holds x, z and y, in the order in which indices run.
@@ -37,16 +38,12 @@ pub fn read(source: &Source, warnings: &mut Vec<Warning>) -> Result<Volume, Faul
         return Err(Fault::whole(format!(
             "a grid of {nx} x {ny} x {nz} has {voxels} voxels, but {} bytes of runs hold {most} at most",
             runs.len()
-        )));
+        ))
+        .into());
     }
     let needed = BitGrid::bytes_for(dims) + BitGrid::bytes_for(Planes::dims(dims));
-    if needed > u128::from(source.limit()) {
-        return Err(Fault::whole(format!(
-            "a grid of {nx} x {ny} x {nz} takes {needed} bytes to read, over the limit of {} bytes",
-            source.limit()
-        ))
-        .with_hint("raise --max-memory"));
-    }
+    let what = || format!("a grid of {nx} x {ny} x {nz} voxels");
+    expect_room(what, needed, source.limit(), RAISE)?;
     let mut grid = BitGrid::new(dims);
     let used = fill(&mut grid, runs, header.end)?;
     if used < runs.len() {
@@ -413,7 +410,8 @@ mod tests {
     fn parse(bytes: &[u8]) -> Result<(Volume, Vec<Warning>), Fault> {
         let source = Source::from_bytes("a.binvox", bytes.to_vec()).unwrap();
         let mut warnings = Vec::new();
-        read(&source, &mut warnings).map(|volume| (volume, warnings))
+        let volume = read(&source, &mut warnings).map_err(Refusal::fault)?;
+        Ok((volume, warnings))
     }
 
     fn written(volume: &Volume) -> Vec<u8> {

@@ -1,6 +1,7 @@
 //! JSON (RFC 8259) and JSON Lines: reports, and any other documents.
 
 use super::header::excerpt;
+use super::refusal::{RAISE, Refusal};
 use super::source::Source;
 use crate::error::Fault;
 use crate::report::Warning;
@@ -35,11 +36,11 @@ const STRING: u64 = 32;
 /// warning. Numbers without fraction or exponent are exact up to 64 bits; all others are the
 /// nearest double. Errors, with line and column from 1, where a text is no JSON, a number is
 /// beyond a double, more than 100 arrays and objects lie in one another, or the documents need more
-/// memory than the limit of the source. Cost: linear in the bytes, each of which is passed twice.
-pub fn read(source: &Source, warnings: &mut Vec<Warning>) -> Result<Vec<Value>, Fault> {
+/// memory than the source may use. Cost: linear in the bytes, each of which is passed twice.
+pub fn read(source: &Source, warnings: &mut Vec<Warning>) -> Result<Vec<Value>, Refusal> {
     let text = unmarked(source.bytes());
     if text.starts_with(b"\xff\xfe") || text.starts_with(b"\xfe\xff") {
-        return Err(Fault::byte(0, "the text is UTF-16, but JSON is UTF-8"));
+        return Err(Fault::byte(0, "the text is UTF-16, but JSON is UTF-8").into());
     }
     let mut builder = Builder {
         limit: source.limit(),
@@ -51,7 +52,7 @@ pub fn read(source: &Source, warnings: &mut Vec<Warning>) -> Result<Vec<Value>, 
         let start = ranges.byte_offset();
         match ranges.next() {
             None => break,
-            Some(Err(error)) => return Err(fault(text, 0, &error, None)),
+            Some(Err(error)) => return Err(fault(text, 0, &error).into()),
             Some(Ok(_)) => {
                 let range = start..ranges.byte_offset();
                 documents.push(build(text, range, &mut builder)?);
@@ -59,7 +60,7 @@ pub fn read(source: &Source, warnings: &mut Vec<Warning>) -> Result<Vec<Value>, 
         }
     }
     if documents.is_empty() {
-        return Err(Fault::whole("has no document, but white space alone"));
+        return Err(Fault::whole("has no document, but white space alone").into());
     }
     if let Some(key) = builder.twice {
         let message = format!(
@@ -80,20 +81,31 @@ pub fn unmarked(text: &[u8]) -> &[u8] {
     text.strip_prefix(MARK).unwrap_or(text)
 }
 
-fn build(text: &[u8], range: Range<usize>, builder: &mut Builder) -> Result<Value, Fault> {
+fn build(text: &[u8], range: Range<usize>, builder: &mut Builder) -> Result<Value, Refusal> {
     let end = range.end;
     let part = text[range].trim_ascii_start();
+    let start = end - part.len();
     let mut parser = Deserializer::from_slice(part);
     let seed = Node {
         builder: &mut *builder,
         depth: 0,
     };
-    seed.deserialize(&mut parser)
-        .map_err(|error| fault(text, end - part.len(), &error, builder.hint))
+    seed.deserialize(&mut parser).map_err(|error| {
+        if builder.held <= builder.limit {
+            return fault(text, start, &error).into();
+        }
+        let (line, column) = place(text, start, &error);
+        Refusal::OverMemory {
+            what: format!("the text up to line {line}, column {column},"),
+            needed: u128::from(builder.held),
+            limit: builder.limit,
+            hint: RAISE,
+        }
+    })
 }
 
-/// The fault that the parser found in the part of a text from `start` on.
-fn fault(text: &[u8], start: usize, error: &serde_json::Error, hint: Option<&str>) -> Fault {
+/// Line and column, from 1, of an error in the part of a text from `start` on.
+fn place(text: &[u8], start: usize, error: &serde_json::Error) -> (usize, usize) {
     let before = &text[..start];
     let lines = before.iter().filter(|b| **b == b'\n').count();
     let shift = match before.iter().rposition(|b| *b == b'\n') {
@@ -102,7 +114,12 @@ fn fault(text: &[u8], start: usize, error: &serde_json::Error, hint: Option<&str
         Some(end) => start - end - 1,
     };
     // What is wrong with a document before it begins has no line of its own.
-    let (line, column) = (lines + error.line().max(1), shift + error.column());
+    (lines + error.line().max(1), shift + error.column())
+}
+
+/// The fault that the parser found in the part of a text from `start` on.
+fn fault(text: &[u8], start: usize, error: &serde_json::Error) -> Fault {
+    let (line, column) = place(text, start, error);
     let words = error.to_string();
     let words = words.split(" at line ").next().unwrap_or_default();
     let problem = match error.classify() {
@@ -112,11 +129,7 @@ fn fault(text: &[u8], start: usize, error: &serde_json::Error, hint: Option<&str
         }
         _ => format!("column {column}: {words}"),
     };
-    let fault = Fault::line(line as u64, problem);
-    match hint {
-        Some(hint) => fault.with_hint(hint),
-        None => fault,
-    }
+    Fault::line(line as u64, problem)
 }
 
 /// What the values of a file have in common while they are built.
@@ -130,8 +143,6 @@ struct Builder {
     doubles: u64,
     /// The first of them.
     twice: Option<String>,
-    /// The way out of the error.
-    hint: Option<&'static str>,
 }
 
 impl Builder {
@@ -140,11 +151,8 @@ impl Builder {
         if self.held <= self.limit {
             return Ok(());
         }
-        self.hint = Some("raise --max-memory");
-        let (held, limit) = (self.held, self.limit);
-        Err(E::custom(format_args!(
-            "the values up to here take up to {held} bytes, over the limit of {limit} bytes"
-        )))
+        // Nothing is read after this, so that the count alone tells what the error is.
+        Err(E::custom("takes more memory than there is"))
     }
 }
 
@@ -250,7 +258,8 @@ mod tests {
     fn parsed(text: &[u8]) -> Result<(Vec<Value>, Vec<Warning>), Fault> {
         let source = Source::from_bytes("a.json", text.to_vec()).expect("held bytes");
         let mut warnings = Vec::new();
-        read(&source, &mut warnings).map(|documents| (documents, warnings))
+        let documents = read(&source, &mut warnings).map_err(Refusal::fault)?;
+        Ok((documents, warnings))
     }
 
     fn documents(text: &str) -> Vec<Value> {
@@ -351,11 +360,17 @@ mod tests {
             ..Builder::default()
         };
         let text = format!("[{}0]", "0,".repeat(100));
-        let fault = build(text.as_bytes(), 0..text.len(), &mut builder).expect_err("too much");
-        assert!(
-            fault.problem.contains("over the limit of 1000 bytes"),
-            "{fault}"
-        );
-        assert_eq!(fault.hint.as_deref(), Some("raise --max-memory"));
+        let refusal = build(text.as_bytes(), 0..text.len(), &mut builder).expect_err("too much");
+        let Refusal::OverMemory {
+            what,
+            needed,
+            limit,
+            ..
+        } = refusal
+        else {
+            panic!("no fault is in the text: {refusal:?}");
+        };
+        assert!(what.starts_with("the text up to line 1, column "), "{what}");
+        assert!(needed > 1000 && limit == 1000, "{needed} of {limit}");
     }
 }

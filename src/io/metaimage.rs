@@ -5,6 +5,7 @@
 
 use super::format::Format;
 use super::header::{Field, Lines, excerpt, join};
+use super::refusal::Refusal;
 use super::samples::{self, ByteOrder, SampleType};
 use super::sink::Sink;
 use crate::error::{Error, Fault, Result};
@@ -22,7 +23,7 @@ use std::io::{self, Write};
 ///
 /// Three dimensions, or two (one slice). The data is measured against the header before room is
 /// made for it.
-pub fn read(source: &Source, warnings: &mut Vec<Warning>) -> Result<Volume, Fault> {
+pub fn read(source: &Source, warnings: &mut Vec<Warning>) -> Result<Volume, Refusal> {
     let header = Header::parse(source.bytes())?;
     let sizes = header.sizes()?;
     let sample = header.sample_type()?;
@@ -41,13 +42,13 @@ pub fn read(source: &Source, warnings: &mut Vec<Warning>) -> Result<Volume, Faul
     } else if packed {
         let bytes = samples::unpack(ZlibDecoder::new(stored), wanted, source.limit())?;
         samples::decode(
-            samples::take(&bytes, wanted, sizes, warnings)?,
+            samples::take(&bytes, wanted, sizes, source.limit(), warnings)?,
             sample,
             order,
         )
     } else {
         samples::decode(
-            samples::take(stored, wanted, sizes, warnings)?,
+            samples::take(stored, wanted, sizes, source.limit(), warnings)?,
             sample,
             order,
         )
@@ -334,7 +335,8 @@ mod tests {
     fn parse(bytes: &[u8]) -> Result<(Volume, Vec<Warning>), Fault> {
         let source = Source::from_bytes("a.mha", bytes.to_vec()).unwrap();
         let mut warnings = Vec::new();
-        read(&source, &mut warnings).map(|volume| (volume, warnings))
+        let volume = read(&source, &mut warnings).map_err(Refusal::fault)?;
+        Ok((volume, warnings))
     }
 
     proptest! {

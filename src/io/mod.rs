@@ -19,6 +19,7 @@ pub mod off;
 mod peers;
 pub mod ply;
 pub mod png;
+pub mod refusal;
 mod samples;
 pub mod sink;
 pub mod source;
@@ -38,6 +39,7 @@ use crate::report::{self, Input, Output, Warning};
 use crate::volume::Volume;
 use crate::volume::bits::BitGrid;
 use format::{Format, Kind};
+use refusal::Refusal;
 use serde_json::Value;
 use sink::Sink;
 use source::Source;
@@ -70,12 +72,11 @@ impl Content {
 
 /// Reads a file of any kind.
 ///
-/// Returns what it holds, its line for the report, and counted warnings about what looks wrong.
+/// Returns what it holds, its line for the report, and counted warnings about what looks wrong. Errs
+/// with [`Error::Malformed`] where the file is not what its format asks for, and with
+/// [`Error::Limit`] where what it holds takes more memory than the source may use.
 pub fn read(source: &Source, format: Option<Format>) -> Result<(Content, Input, Vec<Warning>)> {
-    let malformed = |fault| Error::Malformed {
-        path: source.path().to_owned(),
-        fault,
-    };
+    let malformed = |fault| Refusal::Fault(fault).of(source);
     let format = match format {
         Some(format) => format,
         None => format::sniff(source.bytes(), source.extension()).map_err(malformed)?,
@@ -86,7 +87,7 @@ pub fn read(source: &Source, format: Option<Format>) -> Result<(Content, Input, 
     let mut warnings = Vec::new();
     let (content, digest) =
         rayon::join(|| parse(source, format, &mut warnings), || source.sha256());
-    let content = content.map_err(malformed)?;
+    let content = content.map_err(|refusal| refusal.of(source))?;
     let described = match &content {
         Content::Mesh(mesh) => mesh.content(),
         Content::Volume(volume) => volume.content(),
@@ -106,7 +107,7 @@ pub fn read(source: &Source, format: Option<Format>) -> Result<(Content, Input, 
     Ok((content, input, warnings))
 }
 
-fn parse(source: &Source, format: Format, warnings: &mut Vec<Warning>) -> Result<Content, Fault> {
+fn parse(source: &Source, format: Format, warnings: &mut Vec<Warning>) -> Result<Content, Refusal> {
     let content = match format {
         Format::Obj => Content::Mesh(obj::read(source, warnings)?),
         Format::Ply => Content::Mesh(ply::read(source, warnings)?),
@@ -121,10 +122,9 @@ fn parse(source: &Source, format: Format, warnings: &mut Vec<Warning>) -> Result
         Format::Png => Content::Image(png::read(source)?),
         Format::Json => Content::Report(json::read(source, warnings)?),
         Format::Vti | Format::Vdb => {
-            return Err(Fault::whole(format!(
-                "{} files are written, not read",
-                format.name()
-            )));
+            return Err(
+                Fault::whole(format!("{} files are written, not read", format.name())).into(),
+            );
         }
     };
     match &content {
@@ -177,10 +177,7 @@ pub fn read_report(
 fn wrong_kind(source: &Source, format: &str, found: &Content, wanted: Kind) -> Error {
     let (found, wanted) = (found.kind().with_article(), wanted.with_article());
     let fault = Fault::whole(format!("holds {found} ({format}), but {wanted} is needed"));
-    Error::Malformed {
-        path: source.path().to_owned(),
-        fault,
-    }
+    Refusal::Fault(fault).of(source)
 }
 
 /// Writes a mesh. Returns the lines for the report and warnings about what the format cannot hold.

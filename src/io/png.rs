@@ -1,5 +1,6 @@
 //! PNG images.
 
+use super::refusal::{RAISE, Refusal, expect_room};
 use super::source::Source;
 use crate::error::Fault;
 use crate::image::samples::{Image, Samples};
@@ -17,7 +18,7 @@ pub(super) const MAGIC: &[u8] = b"\x89PNG\r\n\x1a\n";
 /// Palettes become colours, samples of less than 8 bits are widened to 8, and a transparent colour
 /// becomes a channel of opacity. Errors when the data is damaged or ends early, the image is an
 /// animation, or takes more than the source's limit.
-pub fn read(source: &Source) -> Result<Image, Fault> {
+pub fn read(source: &Source) -> Result<Image, Refusal> {
     let bytes = usize::try_from(source.limit()).unwrap_or(usize::MAX);
     let mut decoder = Decoder::new_with_limits(Cursor::new(source.bytes()), Limits { bytes });
     // By the header alone: what it claims is not made room for before.
@@ -33,21 +34,19 @@ pub fn read(source: &Source) -> Result<Image, Fault> {
     if needed > isize::MAX as u128 {
         return Err(Fault::whole(format!(
             "an image of {width} x {height} pixels is larger than memory can be"
-        )));
+        ))
+        .into());
     }
-    if needed > u128::from(source.limit()) {
-        return Err(Fault::whole(format!(
-            "an image of {width} x {height} pixels takes up to {needed} bytes to read, over the limit of {} bytes",
-            source.limit()
-        )));
-    }
+    let what = || format!("an image of {width} x {height} pixels");
+    expect_room(what, needed, source.limit(), RAISE)?;
     decoder.set_transformations(Transformations::EXPAND);
     let mut reader = decoder.read_info().map_err(damaged)?;
     if let Some(animation) = reader.info().animation_control {
         return Err(Fault::whole(format!(
             "an animation of {} frames; only single images are read",
             animation.num_frames
-        )));
+        ))
+        .into());
     }
     let size = reader.output_buffer_size();
     let size = size.ok_or_else(|| Fault::whole("the image is larger than memory can be"))?;
@@ -60,7 +59,9 @@ pub fn read(source: &Source) -> Result<Image, Fault> {
         ColorType::GrayscaleAlpha => 2,
         ColorType::Rgb => 3,
         ColorType::Rgba => 4,
-        ColorType::Indexed => return Err(Fault::whole("the palette's colours are missing")),
+        ColorType::Indexed => {
+            return Err(Fault::whole("the palette's colours are missing").into());
+        }
     };
     let samples = if depth == BitDepth::Sixteen {
         let (pairs, _) = bytes.as_chunks();
@@ -146,7 +147,8 @@ mod tests {
     }
 
     fn decoded(bytes: Vec<u8>) -> Result<Image, Fault> {
-        let image = read(&Source::from_bytes("test.png", bytes).expect("no gzip layer"))?;
+        let image = read(&Source::from_bytes("test.png", bytes).expect("no gzip layer"))
+            .map_err(Refusal::fault)?;
         image.check()?;
         Ok(image)
     }

@@ -1,6 +1,7 @@
 //! Raw samples: bytes to [`Data`] and back, and the checks of sizes that all volume formats share.
 
 use super::header::excerpt;
+use super::refusal::{RAISE, Refusal, expect_room};
 use crate::error::Fault;
 use crate::report::Warning;
 use crate::volume::bits::BitGrid;
@@ -102,19 +103,28 @@ pub fn extent(dims: [u64; 3], sample: usize) -> Result<([usize; 3], usize), Faul
 }
 
 /// The first `wanted` of the bytes that are there; a fault when there are fewer, a warning when more.
+/// Errs too when the samples that they are to become take more than `limit` bytes.
 pub fn take<'a>(
     bytes: &'a [u8],
     wanted: usize,
     dims: [u64; 3],
+    limit: u64,
     warnings: &mut Vec<Warning>,
-) -> Result<&'a [u8], Fault> {
+) -> Result<&'a [u8], Refusal> {
     let [x, y, z] = dims;
     let found = bytes.len();
     if found < wanted {
         return Err(Fault::whole(format!(
             "a grid of {x} x {y} x {z} needs {wanted} bytes of data, but {found} are there"
-        )));
+        ))
+        .into());
     }
+    expect_room(
+        || format!("a grid of {x} x {y} x {z} voxels"),
+        wanted as u128,
+        limit,
+        RAISE,
+    )?;
     if found > wanted {
         warn_trailing(found - wanted, warnings);
     }
@@ -135,13 +145,13 @@ pub fn warn_trailing(count: usize, warnings: &mut Vec<Warning>) {
 ///
 /// Room is made as the bytes come, so a stream that ends early costs no more than it holds.
 /// `limit` is how many bytes may be held.
-pub fn unpack(packed: impl Read, wanted: usize, limit: u64) -> Result<Vec<u8>, Fault> {
-    if wanted as u64 > limit {
-        return Err(Fault::whole(format!(
-            "unpacks to {wanted} bytes, over the limit of {limit} bytes"
-        ))
-        .with_hint("raise --max-memory, or make the input smaller"));
-    }
+pub fn unpack(packed: impl Read, wanted: usize, limit: u64) -> Result<Vec<u8>, Refusal> {
+    expect_room(
+        || "unpacking its data".to_owned(),
+        wanted as u128,
+        limit,
+        RAISE,
+    )?;
     let mut bytes = Vec::new();
     packed
         .take(wanted as u64)

@@ -1,5 +1,6 @@
 //! Where inputs come from: mapped files, standard input, and what lies below a gzip layer.
 
+use super::refusal::{RAISE, Refusal, expect_room};
 use super::sink::hexadecimal;
 use crate::error::{Error, Fault, Result};
 use flate2::read::MultiGzDecoder;
@@ -46,7 +47,7 @@ impl Source {
             source,
         };
         let stored = if word == "-" {
-            Bytes::Held(read_limited(io::stdin().lock(), limit, "standard input")?.map_err(failed)?)
+            Bytes::Held(read_limited(io::stdin().lock(), limit, "reading it")?.map_err(failed)?)
         } else {
             open_bytes(&path, limit)?
         };
@@ -65,9 +66,8 @@ impl Source {
                 path: path.clone(),
                 fault: Fault::whole(format!("the gzip layer is damaged: {e}")),
             };
-            let what = format!("unpacking {name}");
             Some(
-                read_limited(MultiGzDecoder::new(stored.get()), limit, &what)?
+                read_limited(MultiGzDecoder::new(stored.get()), limit, "unpacking it")?
                     .map_err(malformed)?,
             )
         } else {
@@ -131,7 +131,7 @@ impl Source {
     ///
     /// A name that is absolute or leads out of the folder is refused, as is any name in an input
     /// that has no folder.
-    pub fn companion(&self, name: &str) -> Result<Vec<u8>, Fault> {
+    pub fn companion(&self, name: &str) -> Result<Vec<u8>, Refusal> {
         let relative = Path::new(name);
         if name.is_empty()
             || !relative
@@ -140,17 +140,34 @@ impl Source {
         {
             return Err(Fault::whole(format!(
                 "names the data file {name:?}, which is not in its own folder or below"
-            )));
+            ))
+            .into());
         }
         if self.name == "-" {
             return Err(Fault::whole(format!(
                 "names the data file {name:?}, but standard input has no folder"
-            )));
+            ))
+            .into());
         }
         let path = self.path.parent().unwrap_or(Path::new("")).join(relative);
-        let bytes = open_bytes(&path, self.limit)
-            .map_err(|e| Fault::whole(format!("names the data file {name:?}: {e}")))?;
-        Ok(bytes.get().to_vec())
+        let what = || format!("the data file {name:?}");
+        let limit = self.limit;
+        match open_bytes(&path, limit) {
+            Ok(bytes) => {
+                let bytes = bytes.get();
+                expect_room(what, bytes.len() as u128, limit, RAISE)?;
+                Ok(bytes.to_vec())
+            }
+            Err(Error::Limit { .. }) => Err(Refusal::OverMemory {
+                what: what(),
+                needed: u128::from(limit) + 1,
+                limit,
+                hint: RAISE,
+            }),
+            Err(error) => {
+                Err(Fault::whole(format!("names the data file {name:?}: {error}")).into())
+            }
+        }
     }
 }
 
@@ -170,9 +187,8 @@ fn open_bytes(path: &Path, limit: u64) -> Result<Bytes> {
     if about.is_file() && about.len() > 0 {
         return map(&file).map(Bytes::Mapped).map_err(failed);
     }
-    let what = path.display().to_string();
     Ok(Bytes::Held(
-        read_limited(file, limit, &what)?.map_err(failed)?,
+        read_limited(file, limit, "reading it")?.map_err(failed)?,
     ))
 }
 
@@ -188,8 +204,8 @@ fn read_limited(reader: impl Read, limit: u64, what: &str) -> Result<io::Result<
     let mut bytes = Vec::new();
     match reader.take(limit.saturating_add(1)).read_to_end(&mut bytes) {
         Ok(read) if read as u64 > limit => {
-            let hint = Some("raise --max-memory, or make the input smaller");
-            Err(Error::over_memory(what, u128::from(limit) + 1, limit, hint))
+            let needed = u128::from(limit) + 1;
+            Err(Error::over_memory(what, needed, limit, Some(RAISE)))
         }
         Ok(_) => Ok(Ok(bytes)),
         Err(e) => Ok(Err(e)),

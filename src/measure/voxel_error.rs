@@ -4,7 +4,7 @@
 //! number: none of it is the code that set the voxels.
 
 use super::surface::{Elements, Surface};
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::mesh::Mesh;
 use crate::numeric::vector::{Vec3, add, cross, length, scale, sub};
 use crate::progress::Progress;
@@ -61,7 +61,9 @@ pub struct VoxelError {
 /// Measures what [`voxelize::voxelize`] made of `mesh` with `params`.
 ///
 /// Cost: a nearest-element search for every set voxel and, outside of them, for every sample of the
-/// surface, of which there are about 64 to a voxel face. Memory: three more grids.
+/// surface, of which there are about 64 to a voxel face. Memory: three to five more grids, a copy of
+/// the mesh, and trees over its elements and over the runs of set voxels; [`Error::Limit`] refuses
+/// what of it would go over `params.max_memory`.
 pub fn measure(
     mesh: &Mesh,
     made: &Volume,
@@ -84,6 +86,7 @@ pub fn measure(
         voxelize::voxelize(mesh, &params, &crate::progress::Silent)
     };
     progress.stage("verify", 0);
+    let room = Room::new(mesh, made, params, lattice)?;
     let (conservative, three_axis) = (
         again(Mode::Conservative, Fill::None)?.0,
         again(Mode::ThreeAxis, Fill::None)?.0,
@@ -113,7 +116,7 @@ pub fn measure(
         ..Mesh::default()
     };
     let (to_surface_max, to_surface_mean) = to_surface(&grid_mesh, made, solid.as_ref())?;
-    let (from_surface_max, samples) = from_surface(&grid_mesh, made, lattice.dims);
+    let (from_surface_max, samples) = from_surface(&grid_mesh, made, lattice.dims, &room)?;
     let (missed_triangles, missed_area) = missed(&grid_mesh, made, lattice.dims);
     let inside_grid = {
         let bounds = grid_mesh.bounds();
@@ -142,6 +145,57 @@ pub fn measure(
         conservative_voxels: conservative.count_set(),
         not_conservative: by_rule.map_or(0, |surface| outside_of(surface, &conservative)),
     })
+}
+
+/// What the reference takes of the memory that there is.
+struct Room {
+    needed: u128,
+    limit: u64,
+}
+
+impl Room {
+    /// Bytes for each item of a tree while it is built, and for a box.
+    const PER_RUN: u128 = 56 + size_of::<Aabb>() as u128;
+    /// Bytes for each element: indices of the copy and of the tree, corners, the tree's own.
+    const PER_ELEMENT: u128 = 2 * 12 + 72 + 56;
+    /// Bytes for each vertex: its place in the copy, and that in the tree with its index.
+    const PER_VERTEX: u128 = 24 + 32;
+
+    /// The grids, where their size is known beforehand, and the mesh.
+    fn new(
+        mesh: &Mesh,
+        made: &Volume,
+        params: &voxelize::Params,
+        lattice: &Lattice,
+    ) -> Result<Room> {
+        let surface = !matches!(params.mode, Mode::Conservative | Mode::None);
+        let solid = params.fill != Fill::None;
+        let inside = !mesh.triangles.is_empty();
+        let grids = 3 + u128::from(surface) + u128::from(solid) + u128::from(inside);
+        let grid = match made.data {
+            Data::Sparse(_) => 0,
+            _ => BitGrid::bytes_for(lattice.dims),
+        };
+        let elements = mesh.triangles.len() + mesh.segments.len() + mesh.points.len();
+        let room = Room {
+            needed: grids * grid
+                + elements as u128 * Room::PER_ELEMENT
+                + mesh.positions.len() as u128 * Room::PER_VERTEX,
+            limit: params.max_memory,
+        };
+        room.expect(0)?;
+        Ok(room)
+    }
+
+    /// Errs when a tree over so many runs of voxels more is too much.
+    fn expect(&self, runs: usize) -> Result<()> {
+        let needed = self.needed + runs as u128 * Room::PER_RUN;
+        if needed <= u128::from(self.limit) {
+            return Ok(());
+        }
+        let hint = Some("raise --max-memory, or leave --verify out");
+        Err(Error::over_memory("verifying", needed, self.limit, hint))
+    }
 }
 
 impl VoxelError {
@@ -253,10 +307,15 @@ fn to_surface(mesh: &Mesh, made: &Volume, solid: Option<&Volume>) -> Result<(f64
 /// E2: largest distance from samples of the surface to the nearest set voxel, and their number.
 ///
 /// Samples outside of the grid count for nothing: no voxel could be there.
-fn from_surface(mesh: &Mesh, made: &Volume, dims: [usize; 3]) -> (Option<f64>, u64) {
-    let cells = cells(made);
+fn from_surface(
+    mesh: &Mesh,
+    made: &Volume,
+    dims: [usize; 3],
+    room: &Room,
+) -> Result<(Option<f64>, u64)> {
+    let cells = cells(made, room)?;
     if cells.is_empty() {
-        return (None, 0);
+        return Ok((None, 0));
     }
     let bvh = Bvh::build(cells.len() as u32, |i| cells[i as usize]);
     let count = mesh.triangles.len();
@@ -281,14 +340,12 @@ fn from_surface(mesh: &Mesh, made: &Volume, dims: [usize; 3]) -> (Option<f64>, u
         .map(of_chunk)
         .collect();
     let worst = parts.iter().fold(0.0f64, |m, p| m.max(p.0));
-    (
-        Some(if worst <= SAMPLE_ROUNDING { 0.0 } else { worst }),
-        parts.iter().map(|p| p.1).sum(),
-    )
+    let worst = if worst <= SAMPLE_ROUNDING { 0.0 } else { worst };
+    Ok((Some(worst), parts.iter().map(|p| p.1).sum()))
 }
 
 /// The closed boxes of the set voxels, runs along x joined.
-fn cells(made: &Volume) -> Vec<Aabb> {
+fn cells(made: &Volume, room: &Room) -> Result<Vec<Aabb>> {
     let [nx, ny, nz] = made.frame.dims;
     let mut slice = BitGrid::new([nx, ny, 1]);
     let mut found = Vec::new();
@@ -303,8 +360,9 @@ fn cells(made: &Volume) -> Vec<Aabb> {
                 });
             }
         }
+        room.expect(found.len())?;
     }
-    found
+    Ok(found)
 }
 
 /// The runs `x0..x1` of bits that are set, or not, in a row of `nx`.

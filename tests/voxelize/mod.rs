@@ -2,6 +2,8 @@
 
 mod counts;
 mod extremes;
+#[path = "../../src/volume/voxelize/tests/unit.rs"]
+mod unit;
 
 use scantle::error::Error;
 use scantle::mesh::Mesh;
@@ -9,42 +11,7 @@ use scantle::progress::Silent;
 use scantle::volume::Volume;
 use scantle::volume::bits::BitGrid;
 use scantle::volume::voxelize::{Fill, Mode, Params, Size, Stats, Storage, voxelize};
-
-/// The parameters that make voxels of edge 1 from the origin on, so that file coordinates are grid
-/// coordinates.
-fn unit(dims: [usize; 3], mode: Mode, fill: Fill) -> Params {
-    let [x, y, z] = dims.map(|d| d as f64);
-    Params {
-        size: Size::VoxelSize(1.0),
-        bounds: Some([0.0, 0.0, 0.0, x, y, z]),
-        mode,
-        fill,
-        ..Params::DEFAULT
-    }
-}
-
-fn run(mesh: &Mesh, params: &Params) -> (BitGrid, Stats) {
-    let (volume, stats) = voxelize(mesh, params, &Silent).expect("a grid");
-    (bits(&volume), stats)
-}
-
-fn bits(volume: &Volume) -> BitGrid {
-    let mut grid = BitGrid::new(volume.frame.dims);
-    volume.read_bit_slices(0, &mut grid);
-    grid
-}
-
-/// The coordinates of all voxels of a grid.
-fn voxels(dims: [usize; 3]) -> impl Iterator<Item = [usize; 3]> {
-    let [nx, ny, nz] = dims;
-    (0..nx * ny * nz).map(move |i| [i % nx, i / nx % ny, i / nx / ny])
-}
-
-fn set_voxels(grid: &BitGrid) -> Vec<[usize; 3]> {
-    voxels(grid.dims())
-        .filter(|[x, y, z]| grid.get(*x, *y, *z))
-        .collect()
-}
+use unit::{run, set_voxels, unit, voxels};
 
 fn warned(stats: &Stats, code: &str) -> Option<u64> {
     stats

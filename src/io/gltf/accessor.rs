@@ -3,6 +3,7 @@
 use super::document::{Accessor, Buffers, Document, Sparse};
 use crate::error::Fault;
 use crate::io::header::excerpt;
+use crate::io::refusal::Refusal;
 
 /// Elements that an accessor without any bytes behind it may have: enough for every small file, and
 /// no way to ask for memory.
@@ -116,7 +117,7 @@ impl<'a> Reader<'a> {
         index: usize,
         widths: std::ops::RangeInclusive<usize>,
         default: [f64; N],
-    ) -> Result<Vec<[f64; N]>, Fault> {
+    ) -> Result<Vec<[f64; N]>, Refusal> {
         let (accessor, layout) = self.layout(index)?;
         if !widths.contains(&layout.width) || layout.width > N {
             return Err(Fault::element(
@@ -126,7 +127,8 @@ impl<'a> Reader<'a> {
                     "is of type {}, which has no use here",
                     excerpt(&accessor.kind)
                 ),
-            ));
+            )
+            .into());
         }
         let mut values = self.elements(index, accessor, layout, |bytes| {
             layout.element(bytes, default)
@@ -150,7 +152,7 @@ impl<'a> Reader<'a> {
     }
 
     /// The elements of an accessor of unsigned integers.
-    pub fn indices(&mut self, index: usize) -> Result<Vec<u32>, Fault> {
+    pub fn indices(&mut self, index: usize) -> Result<Vec<u32>, Refusal> {
         let (accessor, layout) = self.layout(index)?;
         let fits = layout.width == 1
             && matches!(
@@ -166,14 +168,15 @@ impl<'a> Reader<'a> {
                     excerpt(&accessor.kind),
                     accessor.component_type
                 ),
-            ));
+            )
+            .into());
         }
         self.elements(index, accessor, layout, |bytes| {
             layout.component.number(bytes) as u32
         })
     }
 
-    fn layout(&self, index: usize) -> Result<(&'a Accessor, Layout), Fault> {
+    fn layout(&self, index: usize) -> Result<(&'a Accessor, Layout), Refusal> {
         let all = &self.document.accessors;
         let accessor = all.get(index).ok_or_else(|| {
             Fault::element(
@@ -198,7 +201,7 @@ impl<'a> Reader<'a> {
             "MAT4" => 16,
             other => {
                 let problem = format!("type {:?} is none", excerpt(other));
-                return Err(Fault::element("accessor", index, problem));
+                return Err(Fault::element("accessor", index, problem).into());
             }
         };
         let layout = Layout {
@@ -216,13 +219,13 @@ impl<'a> Reader<'a> {
         accessor: &Accessor,
         layout: Layout,
         element: impl Fn(&[u8]) -> T,
-    ) -> Result<Vec<T>, Fault> {
+    ) -> Result<Vec<T>, Refusal> {
         let size = layout.bytes();
         let Some(view) = accessor.buffer_view else {
             if accessor.sparse.is_none() {
                 // Zeros by the letter; in files that exist, the data is in an extension.
                 let problem = "has no data: neither a bufferView nor sparse values";
-                return Err(Fault::element("accessor", index, problem));
+                return Err(Fault::element("accessor", index, problem).into());
             }
             let most = BARE_ELEMENTS.max(self.buffers.file_bytes());
             if accessor.count > most {
@@ -233,7 +236,8 @@ impl<'a> Reader<'a> {
                         "{} elements of zeros without a bufferView, but at most {most} are read",
                         accessor.count
                     ),
-                ));
+                )
+                .into());
             }
             return Ok(vec![element(&vec![0; size]); accessor.count as usize]);
         };
@@ -260,7 +264,7 @@ impl<'a> Reader<'a> {
         index: usize,
         sparse: &Sparse,
         count: u64,
-    ) -> Result<Vec<usize>, Fault> {
+    ) -> Result<Vec<usize>, Refusal> {
         let fault = |problem: String| Fault::element("accessor", index, problem);
         let from = &sparse.indices;
         let component = Component::of(from.component_type)
@@ -287,7 +291,8 @@ impl<'a> Reader<'a> {
         match places.iter().find(|p| **p as u64 >= count) {
             Some(place) => Err(fault(format!(
                 "a sparse value for element {place}, but there are {count}"
-            ))),
+            ))
+            .into()),
             None => Ok(places),
         }
     }
@@ -301,7 +306,7 @@ impl<'a> Reader<'a> {
         stride: Option<u64>,
         size: usize,
         count: u64,
-    ) -> Result<&[u8], Fault> {
+    ) -> Result<&[u8], Refusal> {
         let fault = |problem: String| Fault::element("accessor", index, problem);
         let views = &self.document.buffer_views;
         let about = views.get(view).ok_or_else(|| {
@@ -314,7 +319,8 @@ impl<'a> Reader<'a> {
         if step < size as u64 {
             return Err(fault(format!(
                 "elements of {size} bytes, but bufferView {view} has a stride of {step}"
-            )));
+            ))
+            .into());
         }
         if count == 0 {
             return Ok(&[]);
@@ -325,7 +331,7 @@ impl<'a> Reader<'a> {
                 "{count} elements from byte {offset} on end at byte {} of bufferView {view}, which has {}",
                 u128::from(offset) + length,
                 about.byte_length
-            )));
+            )).into());
         }
         let buffer = self.buffers.get(about.buffer)?;
         let end = u128::from(about.byte_offset) + u128::from(about.byte_length);
@@ -338,7 +344,8 @@ impl<'a> Reader<'a> {
                     about.buffer,
                     buffer.len()
                 ),
-            ));
+            )
+            .into());
         }
         // Both are within the buffer now, so they fit.
         let start = (about.byte_offset + offset) as usize;

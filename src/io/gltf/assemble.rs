@@ -4,6 +4,7 @@ use super::accessor::Reader;
 use super::document::Primitive;
 use super::scene::Placed;
 use crate::error::Fault;
+use crate::io::refusal::{Refusal, expect_room};
 use crate::mesh::Mesh;
 use crate::numeric::vector::normalize;
 use crate::report::Warning;
@@ -14,7 +15,7 @@ pub fn assemble(
     placed: &[Placed],
     limit: u64,
     warnings: &mut Vec<Warning>,
-) -> Result<Mesh, Fault> {
+) -> Result<Mesh, Refusal> {
     let mut work = Assembly {
         reader,
         limit,
@@ -105,19 +106,19 @@ struct Assembly<'a> {
 type Attributes = (usize, Option<usize>, Option<usize>);
 
 impl<'a> Assembly<'a> {
-    fn primitives(&self, place: &Placed) -> Result<&'a [Primitive], Fault> {
+    fn primitives(&self, place: &Placed) -> Result<&'a [Primitive], Refusal> {
         let meshes = &self.reader.document.meshes;
         match meshes.get(place.mesh) {
             Some(mesh) => Ok(&mesh.primitives),
             None => {
                 let problem = format!("has mesh {}, but there are {}", place.mesh, meshes.len());
-                Err(Fault::element("node", place.node, problem))
+                Err(Fault::element("node", place.node, problem).into())
             }
         }
     }
 
     /// Finds out which attributes every primitive has, and counts what will be left out.
-    fn survey(&mut self, placed: &[Placed]) -> Result<(), Fault> {
+    fn survey(&mut self, placed: &[Placed]) -> Result<(), Refusal> {
         let (mut total, mut normals, mut colors) = (0, 0, 0);
         for place in placed {
             self.counts.skins += u64::from(place.skinned);
@@ -141,7 +142,7 @@ impl<'a> Assembly<'a> {
     }
 
     /// Adds the primitives of one node.
-    fn place(&mut self, place: &Placed) -> Result<(), Fault> {
+    fn place(&mut self, place: &Placed) -> Result<(), Refusal> {
         // The vertices made for this node so far: the accessors, the first vertex and the number.
         let mut made: Vec<(Attributes, usize, usize)> = Vec::new();
         for (index, primitive) in self.primitives(place)?.iter().enumerate() {
@@ -173,7 +174,7 @@ impl<'a> Assembly<'a> {
     }
 
     /// Adds the vertices of one set of accessors. Returns their number.
-    fn add_vertices(&mut self, place: &Placed, attributes: Attributes) -> Result<usize, Fault> {
+    fn add_vertices(&mut self, place: &Placed, attributes: Attributes) -> Result<usize, Refusal> {
         let (position, normal, color) = attributes;
         let positions = self.reader.vectors(position, 3..=3, [0.0; 3])?;
         let count = positions.len();
@@ -201,24 +202,28 @@ impl<'a> Assembly<'a> {
     }
 
     /// Whether so many vertices and corners more can be held.
-    fn fits(&self, place: &Placed, vertices: u64, corners: u64) -> Result<(), Fault> {
+    fn fits(&self, place: &Placed, vertices: u64, corners: u64) -> Result<(), Refusal> {
         let vertices = self.mesh.positions.len() as u64 + vertices;
         let held = 3 * self.mesh.triangles.len() + 2 * self.mesh.segments.len();
         let corners = (held + self.mesh.points.len()) as u64 + corners;
         let bytes = u128::from(vertices) * 64 + u128::from(corners) * 4;
-        if vertices > u64::from(u32::MAX) || bytes > u128::from(self.limit) {
-            return Err(Fault::element(
-                "node",
-                place.node,
-                format!(
-                    "with its mesh there are {vertices} vertices, which take {bytes} bytes, over \
-                     the limit of {} bytes or 2^32 vertices",
-                    self.limit
-                ),
-            )
-            .with_hint("raise --max-memory, or use the mesh in fewer nodes"));
+        if vertices > u64::from(u32::MAX) {
+            let problem = format!(
+                "with its mesh there are {vertices} vertices, but at most {} can be held",
+                u32::MAX
+            );
+            return Err(Fault::element("node", place.node, problem)
+                .with_hint("use the mesh in fewer nodes")
+                .into());
         }
-        Ok(())
+        let what = || {
+            format!(
+                "the mesh with that of node {}, {vertices} vertices,",
+                place.node
+            )
+        };
+        let hint = "raise --max-memory, or use the mesh in fewer nodes";
+        expect_room(what, bytes, self.limit, hint)
     }
 
     /// Adds the triangles, segments or points of a primitive whose vertices begin at `base`.
@@ -229,7 +234,7 @@ impl<'a> Assembly<'a> {
         primitive: &Primitive,
         base: usize,
         count: usize,
-    ) -> Result<(), Fault> {
+    ) -> Result<(), Refusal> {
         let fault = |problem: String| {
             let problem = format!("primitive {primitive_index}: {problem}");
             Fault::element("mesh", place.mesh, problem)
@@ -242,7 +247,8 @@ impl<'a> Assembly<'a> {
                     if *index as usize >= count {
                         return Err(fault(format!(
                             "index {i} refers to vertex {index}, but there are {count}"
-                        )));
+                        ))
+                        .into());
                     }
                     *index += base;
                 }
@@ -304,7 +310,7 @@ impl<'a> Assembly<'a> {
                 }
                 short(3)
             }
-            mode => return Err(fault(format!("mode {mode} is none of 0 to 6"))),
+            mode => return Err(fault(format!("mode {mode} is none of 0 to 6")).into()),
         };
         self.counts.incomplete += left as u64;
         Ok(())

@@ -2,6 +2,7 @@
 
 use crate::error::Fault;
 use crate::io::header::excerpt;
+use crate::io::refusal::Refusal;
 use crate::io::samples::warn_trailing;
 use crate::io::source::Source;
 use crate::report::Warning;
@@ -303,7 +304,7 @@ impl<'a> Buffers<'a> {
     }
 
     /// The bytes of a buffer, as many as it states.
-    pub fn get(&mut self, index: usize) -> Result<&[u8], Fault> {
+    pub fn get(&mut self, index: usize) -> Result<&[u8], Refusal> {
         if !self.loaded.contains_key(&index) {
             let bytes = self.load(index)?;
             self.loaded.insert(index, bytes);
@@ -311,23 +312,30 @@ impl<'a> Buffers<'a> {
         Ok(&self.loaded[&index])
     }
 
-    fn load(&self, index: usize) -> Result<Cow<'a, [u8]>, Fault> {
+    fn load(&self, index: usize) -> Result<Cow<'a, [u8]>, Refusal> {
         let fault = |problem: String| Fault::element("buffer", index, problem);
         let Some(entry) = self.entries.get(index) else {
             return Err(fault(format!(
                 "is referred to, but there are {}",
                 self.entries.len()
-            )));
+            ))
+            .into());
         };
         let bytes: Cow<'a, [u8]> = match (&entry.uri, self.chunk) {
             (Some(uri), _) if uri.starts_with("data:") => data_uri(uri).map_err(fault)?.into(),
             (Some(uri), _) => {
                 let name = percent_decoded(uri).map_err(fault)?;
                 let bytes = self.source.companion(&name);
-                bytes.map_err(|f| fault(f.problem))?.into()
+                let bytes = bytes.map_err(|refusal| match refusal {
+                    Refusal::Fault(found) => fault(found.problem).into(),
+                    over => over,
+                });
+                bytes?.into()
             }
             (None, Some(chunk)) if index == 0 => chunk.into(),
-            (None, _) => return Err(fault("has no data: no uri and no binary chunk".into())),
+            (None, _) => {
+                return Err(fault("has no data: no uri and no binary chunk".into()).into());
+            }
         };
         let found = bytes.len();
         match usize::try_from(entry.byte_length) {
@@ -341,7 +349,8 @@ impl<'a> Buffers<'a> {
             _ => Err(fault(format!(
                 "states {} bytes, but its data has {found}",
                 entry.byte_length
-            ))),
+            ))
+            .into()),
         }
     }
 }

@@ -11,7 +11,7 @@ mod scene;
 mod sniff;
 mod write;
 
-use crate::error::Fault;
+use crate::io::refusal::Refusal;
 use crate::io::source::Source;
 use crate::mesh::Mesh;
 use crate::report::Warning;
@@ -28,7 +28,7 @@ pub use write::write;
 ///
 /// Every index, length and count is checked against what is there before room is made; what the
 /// nodes make of it must fit the limit of the source.
-pub fn read(source: &Source, warnings: &mut Vec<Warning>) -> Result<Mesh, Fault> {
+pub fn read(source: &Source, warnings: &mut Vec<Warning>) -> Result<Mesh, Refusal> {
     let opened = document::open(source.bytes(), warnings)?;
     let placed = scene::placed(&opened.document)?;
     let buffers = document::Buffers::new(source, &opened.document.buffers, opened.chunk);

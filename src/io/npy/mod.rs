@@ -6,8 +6,8 @@
 
 mod header;
 
+use super::refusal::Refusal;
 use super::samples::{self, ByteOrder, SampleType};
-use crate::error::Fault;
 use crate::io::source::Source;
 use crate::report::Warning;
 use crate::volume::{Data, Frame, Volume};
@@ -19,7 +19,7 @@ use std::io::{self, Write};
 ///
 /// Both byte orders and both axis orders; bool becomes bits, half precision becomes single. The
 /// data is measured against the shape before room is made for it.
-pub fn read(source: &Source, warnings: &mut Vec<Warning>) -> Result<Volume, Fault> {
+pub fn read(source: &Source, warnings: &mut Vec<Warning>) -> Result<Volume, Refusal> {
     let bytes = source.bytes();
     let header = header::parse(bytes)?;
     let sizes = header.sizes()?;
@@ -29,7 +29,13 @@ pub fn read(source: &Source, warnings: &mut Vec<Warning>) -> Result<Volume, Faul
         Kind::Number(sample) => sample.bytes(),
     };
     let (dims, wanted) = samples::extent(sizes, width)?;
-    let body = samples::take(&bytes[header.end..], wanted, sizes, warnings)?;
+    let body = samples::take(
+        &bytes[header.end..],
+        wanted,
+        sizes,
+        source.limit(),
+        warnings,
+    )?;
     let stored = match header.kind {
         Kind::Bool => Data::U8(body.to_vec()),
         Kind::Half => Data::F32(halves(body, header.order)),
@@ -133,12 +139,13 @@ pub fn write(volume: &Volume, out: &mut dyn Write) -> io::Result<()> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::error::Fault;
     use crate::io::samples::tests::{raw, volumes};
     use proptest::prelude::*;
 
     fn parse(bytes: &[u8]) -> Result<Volume, Fault> {
         let source = Source::from_bytes("a.npy", bytes.to_vec()).unwrap();
-        read(&source, &mut Vec::new())
+        read(&source, &mut Vec::new()).map_err(Refusal::fault)
     }
 
     /// An array of version 1 by its header text.

@@ -9,6 +9,7 @@ mod frame;
 mod header;
 
 use super::header::join;
+use super::refusal::Refusal;
 use super::samples::{self, SampleType};
 use crate::error::Fault;
 use crate::io::source::Source;
@@ -23,7 +24,7 @@ use std::io::{self, Write};
 ///
 /// Three axes, two (one slice), or four of which the first has size 1. The data is measured
 /// against the header before room is made for it.
-pub fn read(source: &Source, warnings: &mut Vec<Warning>) -> Result<Volume, Fault> {
+pub fn read(source: &Source, warnings: &mut Vec<Warning>) -> Result<Volume, Refusal> {
     let header = Header::parse(source.bytes())?;
     let layout = frame::layout(&header)?;
     let sample = header.sample_type()?;
@@ -40,7 +41,7 @@ pub fn read(source: &Source, warnings: &mut Vec<Warning>) -> Result<Volume, Faul
         Encoding::Raw => {
             let body = after_bytes(stored, bytes, wanted)?;
             samples::decode(
-                samples::take(body, wanted, layout.dims, warnings)?,
+                samples::take(body, wanted, layout.dims, source.limit(), warnings)?,
                 sample,
                 order,
             )
@@ -49,7 +50,8 @@ pub fn read(source: &Source, warnings: &mut Vec<Warning>) -> Result<Volume, Faul
             if bytes < 0 {
                 return Err(Fault::whole(
                     "byte skip: -1 goes with the encoding raw alone, and this file is gzip",
-                ));
+                )
+                .into());
             }
             let whole = usize::try_from(bytes)
                 .ok()
@@ -58,7 +60,7 @@ pub fn read(source: &Source, warnings: &mut Vec<Warning>) -> Result<Volume, Faul
             let body = samples::unpack(MultiGzDecoder::new(stored), whole, source.limit())?;
             let body = after_bytes(&body, bytes, wanted)?;
             samples::decode(
-                samples::take(body, wanted, layout.dims, warnings)?,
+                samples::take(body, wanted, layout.dims, source.limit(), warnings)?,
                 sample,
                 order,
             )

@@ -6,7 +6,8 @@ use proptest::prelude::*;
 fn parse(bytes: &[u8]) -> Result<(Volume, Vec<Warning>), Fault> {
     let source = Source::from_bytes("a.nrrd", bytes.to_vec()).unwrap();
     let mut warnings = Vec::new();
-    read(&source, &mut warnings).map(|volume| (volume, warnings))
+    let volume = read(&source, &mut warnings).map_err(Refusal::fault)?;
+    Ok((volume, warnings))
 }
 
 fn with(fields: &str, data: &[u8]) -> Result<(Volume, Vec<Warning>), Fault> {

@@ -158,13 +158,13 @@ impl<'v> Path<'v> {
         self.steps.pop();
     }
 
-    /// Whether the member `key` of the object here is left out of the comparison of reports.
-    pub(super) fn is_left_out(&self, key: &str) -> bool {
-        match self.steps[..] {
-            [] => key == "run",
-            [Step::Key("input" | "output"), Step::Index(_)] => key == "path",
-            _ => false,
-        }
+    /// Whether the member `key` of the object here is what a pointer with `*` for indices names.
+    pub(super) fn is_at(&self, key: &str, pointer: &str) -> bool {
+        let mut tokens = pointer.split('/').skip(1);
+        self.steps.iter().all(|step| match step {
+            Step::Key(here) => tokens.next() == Some(here),
+            Step::Index(_) => tokens.next() == Some("*"),
+        }) && tokens.eq([key])
     }
 
     /// A difference here.

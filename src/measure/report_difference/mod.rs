@@ -2,7 +2,7 @@
 
 use crate::error::{Error, Result};
 use crate::progress::Progress;
-use crate::report::{Accuracy, is_report};
+use crate::report::{Accuracy, VARIES, is_report, stated_to_vary};
 use gap::gap;
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -26,7 +26,7 @@ pub struct Params {
     /// larger of the two.
     pub tolerance: f64,
     /// Whether that is compared too which is left out of reports: `run`, which varies from run to
-    /// run, and the `path` of each `input` and `output`.
+    /// run, the `path` of each `input` and `output`, and what both reports state in `varies`.
     pub everything: bool,
 }
 
@@ -100,8 +100,8 @@ impl ReportDifference {
 ///
 /// Numbers are compared by their values, however they are written: integers exactly, all others as
 /// doubles. The order of an object's members does not matter. Of arrays of different lengths, the
-/// elements that both have are compared too. Of documents that both are reports of scantle, the
-/// block `run` and the paths of inputs and outputs are left out, unless asked for. Errors when the
+/// elements that both have are compared too. Of documents that both are reports of scantle,
+/// [`VARIES`] and what both state to vary are left out, unless asked for. Errors when the
 /// parameters are out of range. Cost: linear in the values, and as deep a stack as they are nested.
 pub fn compare(
     a: &[Value],
@@ -116,7 +116,7 @@ pub fn compare(
         walk.path = Path::new(index as u64);
         match (a.get(index), b.get(index)) {
             (Some(a), Some(b)) => {
-                walk.in_reports = !params.everything && is_report(a) && is_report(b);
+                walk.left_out = left_out(a, b, params);
                 walk.values(a, b);
             }
             (a, b) => walk.lone(a, b),
@@ -126,10 +126,21 @@ pub fn compare(
     Ok(walk.end())
 }
 
+/// The members of two documents that are not compared.
+fn left_out<'v>(a: &'v Value, b: &'v Value, params: &Params) -> Vec<&'v str> {
+    if params.everything || !is_report(a) || !is_report(b) {
+        return Vec::new();
+    }
+    // A file alone cannot keep back what the other one has.
+    let of_b: Vec<&str> = stated_to_vary(b).collect();
+    let of_both = stated_to_vary(a).filter(|pointer| of_b.contains(pointer));
+    VARIES.iter().copied().chain(of_both).collect()
+}
+
 /// A walk through two documents at once.
 struct Walk<'v> {
     tolerance: f64,
-    in_reports: bool,
+    left_out: Vec<&'v str>,
     path: Path<'v>,
     max_absolute: f64,
     found: ReportDifference,
@@ -139,7 +150,7 @@ impl<'v> Walk<'v> {
     fn new(a: &[Value], b: &[Value], tolerance: f64) -> Self {
         Walk {
             tolerance,
-            in_reports: false,
+            left_out: Vec::new(),
             path: Path::new(0),
             max_absolute: 0.0,
             found: ReportDifference {
@@ -201,7 +212,8 @@ impl<'v> Walk<'v> {
     }
 
     fn member(&mut self, key: &'v str, a: Option<&'v Value>, b: Option<&'v Value>) {
-        if self.in_reports && self.path.is_left_out(key) {
+        let mut left_out = self.left_out.iter();
+        if left_out.any(|pointer| self.path.is_at(key, pointer)) {
             self.found.left_out += 1;
             return;
         }

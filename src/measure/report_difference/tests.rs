@@ -143,6 +143,32 @@ fn what_varies_from_run_to_run_is_left_out_of_reports() {
 }
 
 #[test]
+fn what_both_reports_state_to_vary_is_left_out() {
+    let stating = |varies: Value, seconds: f64| {
+        let mut report = report("a.obj", 1.0);
+        report["result"] = json!({"rows": [{"s": seconds, "e": 1}, {"s": 1.0}], "s": 1.0});
+        report["varies"] = varies;
+        report
+    };
+    let pointer = || json!(["/result/rows/*/s"]);
+    let (a, b) = (stating(pointer(), 1.0), stating(pointer(), 2.0));
+    let found = differ(&a, &b, 0.0);
+    assert!(found.identical, "{:?}", words(&found));
+    assert_eq!(found.left_out, 2 + 3);
+    // What only one states is compared, and so is the statement.
+    let alone = differ(&a, &stating(json!([]), 2.0), 0.0);
+    let paths: Vec<_> = alone.first.iter().map(|d| d.path.as_str()).collect();
+    assert_eq!(paths, ["/result/rows/0/s", "/varies"]);
+    // A pointer names a member as a whole, no part of it and none of another depth.
+    for other in ["/result/s", "/result/rows/0/s", "/result/rows/*", "s", ""] {
+        let [a, b] = [1.0, 2.0].map(|s| stating(json!([other]), s));
+        assert_eq!(differ(&a, &b, 0.0).differing, 1, "{other}");
+    }
+    let [a, b] = [1.0, 2.0].map(|s| stating(json!(["/result", 7]), s));
+    assert!(differ(&a, &b, 0.0).identical);
+}
+
+#[test]
 fn documents_are_compared_one_by_one() {
     let a = [json!(1), json!({"x": 1}), json!("end")];
     let b = [json!(1), json!({"x": 2})];

@@ -4,6 +4,7 @@ use super::motion::Motion;
 use crate::mesh::Mesh;
 use crate::numeric::rng::Rng;
 use crate::numeric::vector::{Vec3, length, sub};
+use crate::trade::Change;
 use schemars::JsonSchema;
 use serde::Serialize;
 
@@ -16,20 +17,8 @@ pub enum Step {
     Shift(f64),
     /// Turned by 90 degrees about this axis of the coordinates.
     QuarterTurn(usize),
-    /// Turned by one radian about (1, 2, 3).
-    Turn,
-    /// Vertices in another order.
-    VertexOrder,
-    /// Elements in another order.
-    FaceOrder,
-    /// Vertices of their own for every element.
-    SplitVertices,
-    /// Every element twice.
-    DuplicateFaces,
-    /// Triangles without area added at vertices in use.
-    DegenerateFaces,
-    /// Every coordinate one bit up, down, or as it is.
-    Jitter,
+    /// A change that has no size; [`Change::Turn`] is by one radian about (1, 2, 3).
+    Plain(Change),
 }
 
 /// A mesh after a step.
@@ -97,8 +86,8 @@ impl Step {
                 moved(mesh, Motion::shift([far, -0.5 * far, 0.25 * far]), true)
             }
             Step::QuarterTurn(axis) => moved(mesh, Motion::quarter_turn(axis), true),
-            Step::Turn => moved(mesh, Motion::turn([1.0, 2.0, 3.0], 1.0), false),
-            Step::Jitter => {
+            Step::Plain(Change::Turn) => moved(mesh, Motion::turn([1.0, 2.0, 3.0], 1.0), false),
+            Step::Plain(Change::Jitter) => {
                 let mut changed = mesh.clone();
                 for (v, p) in changed.positions.iter_mut().enumerate() {
                     let mut rng = Rng::new(seed, v as u64);
@@ -112,48 +101,51 @@ impl Step {
                     rounding,
                 })
             }
-            _ => Ok(Changed {
-                mesh: self.rearranged(mesh, seed)?,
+            Step::Plain(change) => Ok(Changed {
+                mesh: rearranged(change, mesh, seed)?,
                 motion: Motion::NONE,
                 rounded: None,
                 rounding: Rounding::default(),
             }),
         }
     }
+}
 
-    fn rearranged(self, mesh: &Mesh, seed: u64) -> Result<Mesh, String> {
-        let mut changed = Mesh {
-            polygons: None,
-            ..mesh.clone()
-        };
-        match self {
-            Step::VertexOrder => permute_vertices(&mut changed, seed),
-            Step::FaceOrder => {
-                shuffle(&mut changed.triangles, seed);
-                shuffle(&mut changed.segments, seed);
-                shuffle(&mut changed.points, seed);
-            }
-            Step::SplitVertices => changed = split(mesh),
-            Step::DuplicateFaces => {
-                changed.triangles.extend_from_within(..);
-                changed.segments.extend_from_within(..);
-                changed.points.extend_from_within(..);
-            }
-            Step::DegenerateFaces => {
-                if mesh.triangles.is_empty() {
-                    return Err("there is no triangle to add others at".to_owned());
-                }
-                for i in 0..DEGENERATE {
-                    let mut rng = Rng::new(seed, i);
-                    let [a, b, _] = mesh.triangles[rng.below(mesh.triangles.len())];
-                    let flat = if i % 2 == 0 { [a, a, a] } else { [a, b, b] };
-                    changed.triangles.push(flat);
-                }
-            }
-            _ => {}
+/// The mesh with other elements, or in another order.
+fn rearranged(change: Change, mesh: &Mesh, seed: u64) -> Result<Mesh, String> {
+    let mut changed = Mesh {
+        polygons: None,
+        ..mesh.clone()
+    };
+    match change {
+        Change::VertexOrder => permute_vertices(&mut changed, seed),
+        Change::FaceOrder => {
+            shuffle(&mut changed.triangles, seed);
+            shuffle(&mut changed.segments, seed);
+            shuffle(&mut changed.points, seed);
         }
-        Ok(changed)
+        Change::SplitVertices => changed = split(mesh),
+        Change::DuplicateFaces => {
+            changed.triangles.extend_from_within(..);
+            changed.segments.extend_from_within(..);
+            changed.points.extend_from_within(..);
+        }
+        Change::DegenerateFaces => {
+            if mesh.triangles.is_empty() {
+                return Err("there is no triangle to add others at".to_owned());
+            }
+            for i in 0..DEGENERATE {
+                let mut rng = Rng::new(seed, i);
+                let [a, b, _] = mesh.triangles[rng.below(mesh.triangles.len())];
+                let flat = if i % 2 == 0 { [a, a, a] } else { [a, b, b] };
+                changed.triangles.push(flat);
+            }
+        }
+        Change::Scale | Change::Shift | Change::QuarterTurn | Change::Turn | Change::Jitter => {
+            return Err(format!("{} is no change of elements", change.name()));
+        }
     }
+    Ok(changed)
 }
 
 /// A mesh moved. `exactly` says that the motion, undone, gives back what was really moved.

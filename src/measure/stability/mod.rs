@@ -20,16 +20,18 @@ use serde::{Deserialize, Serialize};
 pub fn steps(scales: &[i32], offsets: &[f64]) -> Vec<Step> {
     let scales = scales.iter().map(|exponent| Step::Scale(*exponent));
     let offsets = offsets.iter().map(|extents| Step::Shift(*extents));
-    let turns = (0..3).map(Step::QuarterTurn).chain([Step::Turn]);
-    let elements = [
-        Step::VertexOrder,
-        Step::FaceOrder,
-        Step::SplitVertices,
-        Step::DuplicateFaces,
-        Step::DegenerateFaces,
-        Step::Jitter,
+    let turns = (0..3).map(Step::QuarterTurn);
+    let plain = [
+        Change::Turn,
+        Change::VertexOrder,
+        Change::FaceOrder,
+        Change::SplitVertices,
+        Change::DuplicateFaces,
+        Change::DegenerateFaces,
+        Change::Jitter,
     ];
-    scales.chain(offsets).chain(turns).chain(elements).collect()
+    let plain = plain.map(Step::Plain);
+    scales.chain(offsets).chain(turns).chain(plain).collect()
 }
 
 /// How far results hold, by the steps that were tried.
@@ -84,13 +86,7 @@ impl Step {
             Step::Scale(_) => Change::Scale,
             Step::Shift(_) => Change::Shift,
             Step::QuarterTurn(_) => Change::QuarterTurn,
-            Step::Turn => Change::Turn,
-            Step::VertexOrder => Change::VertexOrder,
-            Step::FaceOrder => Change::FaceOrder,
-            Step::SplitVertices => Change::SplitVertices,
-            Step::DuplicateFaces => Change::DuplicateFaces,
-            Step::DegenerateFaces => Change::DegenerateFaces,
-            Step::Jitter => Change::Jitter,
+            Step::Plain(change) => change,
         }
     }
 
@@ -100,7 +96,7 @@ impl Step {
             Step::Scale(exponent) => format!("2^{exponent}"),
             Step::Shift(extents) => format!("{extents:e} extents"),
             Step::QuarterTurn(axis) => format!("about {}", ["x", "y", "z"][axis.min(2)]),
-            _ => String::new(),
+            Step::Plain(_) => String::new(),
         }
     }
 }

@@ -2,6 +2,7 @@
 
 use crate::numeric::vector::{Vec3, add, dot, normalize, sub};
 use crate::spatial::aabb::Aabb;
+use crate::trade::Part;
 
 /// A turn, then a scaling by a power of two, then a shift.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -110,21 +111,64 @@ impl Motion {
         length * 2f64.powi(self.exponent)
     }
 
-    /// What becomes of a point (three numbers) or of a box along the axes (six: its lower corner,
-    /// then its upper). Errs for other counts, and where the box would not stand along the axes.
-    pub fn place(&self, numbers: &[f64]) -> Result<Vec<f64>, String> {
-        match *numbers {
-            [x, y, z] => Ok(self.apply([x, y, z]).to_vec()),
-            [x0, y0, z0, x1, y1, z1] => {
-                let is_straight = self.turn.as_flattened().iter().all(|c| c.fract() == 0.0);
-                if !is_straight {
-                    return Err("a box along the axes cannot be turned".to_owned());
-                }
-                let corners = [[x0, y0, z0], [x1, y1, z1]].map(|p| self.apply(p));
-                let moved = Aabb::around(&corners);
-                Ok([moved.lo, moved.hi].concat())
-            }
-            _ => Err(format!("{} numbers are no place", numbers.len())),
+    /// What becomes of the numbers of an option. Errs where there are not as many as the parts take,
+    /// one of them overflows, or a box would not stand along the axes.
+    pub fn place(&self, parts: &[Part], numbers: &[f64]) -> Result<Vec<f64>, String> {
+        self.each(parts, numbers, |part, n| match part {
+            Part::Length => vec![self.length(n[0])],
+            Part::Point => self.apply([n[0], n[1], n[2]]).to_vec(),
+            Part::Direction => self.turned([n[0], n[1], n[2]]).to_vec(),
+            Part::Box => boxed(n, |corner| self.apply(corner)),
+            Part::Number => n.to_vec(),
+        })
+    }
+
+    /// Where the numbers of an option come from: [`Motion::place`] undone.
+    pub fn place_back(&self, parts: &[Part], numbers: &[f64]) -> Result<Vec<f64>, String> {
+        self.each(parts, numbers, |part, n| match part {
+            Part::Length => vec![n[0] * 2f64.powi(-self.exponent)],
+            Part::Point => self.undo([n[0], n[1], n[2]]).to_vec(),
+            Part::Direction => self.turned_back([n[0], n[1], n[2]]).to_vec(),
+            Part::Box => boxed(n, |corner| self.undo(corner)),
+            Part::Number => n.to_vec(),
+        })
+    }
+
+    fn each(
+        &self,
+        parts: &[Part],
+        numbers: &[f64],
+        moved: impl Fn(Part, &[f64]) -> Vec<f64>,
+    ) -> Result<Vec<f64>, String> {
+        let wanted: usize = parts.iter().map(|part| part.numbers()).sum();
+        if wanted != numbers.len() {
+            return Err(format!(
+                "{} numbers, where {wanted} are taken",
+                numbers.len()
+            ));
+        }
+        let is_straight = self.turn.as_flattened().iter().all(|c| c.fract() == 0.0);
+        if parts.contains(&Part::Box) && !is_straight {
+            return Err("a box along the axes cannot be turned".to_owned());
+        }
+        let mut rest = numbers;
+        let mut found = Vec::with_capacity(numbers.len());
+        for part in parts {
+            let (own, others) = rest.split_at(part.numbers());
+            found.extend(moved(*part, own));
+            rest = others;
+        }
+        if found.iter().all(|n| n.is_finite()) {
+            Ok(found)
+        } else {
+            Err("a number overflows".to_owned())
         }
     }
+}
+
+/// The box around the moved corners of another: six numbers.
+fn boxed(numbers: &[f64], moved: impl Fn(Vec3) -> Vec3) -> Vec<f64> {
+    let corners = [0, 3].map(|i| moved([numbers[i], numbers[i + 1], numbers[i + 2]]));
+    let around = Aabb::around(&corners);
+    [around.lo, around.hi].concat()
 }

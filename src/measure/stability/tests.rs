@@ -2,6 +2,7 @@ use super::*;
 use crate::mesh::Mesh;
 use crate::mesh::shapes::{octasphere, torus_knot};
 use crate::numeric::vector::{Vec3, length, sub};
+use crate::trade::{Change, Part};
 use crate::volume::bits::BitGrid;
 use crate::volume::{Data, Frame, Volume};
 
@@ -29,16 +30,43 @@ fn motions_are_undone() {
         let same = Motion::turn(unit, std::f64::consts::FRAC_PI_2);
         assert!(length(sub(same.apply(p), quarter.apply(p))) < 1e-14);
     }
-    let scaled = Motion::scale(-3).place(&[8.0, 16.0, 0.0, 9.0, 17.0, 1.0]);
-    assert_eq!(scaled, Ok(vec![1.0, 2.0, 0.0, 1.125, 2.125, 0.125]));
-    let turned = Motion::quarter_turn(2).place(&[1.0, 2.0, 3.0, 4.0, 6.0, 9.0]);
-    assert_eq!(turned, Ok(vec![-6.0, 1.0, 3.0, -2.0, 4.0, 9.0]));
-    assert!(turn.place(&[0.0, 0.0, 0.0, 1.0, 1.0, 1.0]).is_err());
-    assert_eq!(
-        Motion::shift([1.0; 3]).place(&[1.0, 2.0, 3.0]),
-        Ok(vec![2.0, 3.0, 4.0])
+}
+
+#[test]
+fn options_move_as_what_they_are() {
+    let place = |motion: Motion, parts: &[Part], numbers: &[f64]| {
+        let there = motion.place(parts, numbers).expect("a place");
+        assert_eq!(
+            motion.place_back(parts, &there).as_deref(),
+            Ok(numbers),
+            "{motion:?} {parts:?}"
+        );
+        there
+    };
+    let scaled = place(
+        Motion::scale(-3),
+        &[Part::Box],
+        &[8.0, 16.0, 0.0, 9.0, 17.0, 1.0],
     );
-    assert!(turn.place(&[1.0]).is_err());
+    assert_eq!(scaled, [1.0, 2.0, 0.0, 1.125, 2.125, 0.125]);
+    let quarter = Motion::quarter_turn(2);
+    let turned = place(quarter, &[Part::Box], &[1.0, 2.0, 3.0, 4.0, 6.0, 9.0]);
+    assert_eq!(turned, [-6.0, 1.0, 3.0, -2.0, 4.0, 9.0]);
+    let both = Motion {
+        exponent: 1,
+        shift: [10.0, 20.0, 30.0],
+        ..quarter
+    };
+    let parts = [Part::Point, Part::Length, Part::Direction, Part::Number];
+    let moved = place(both, &parts, &[1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0]);
+    assert_eq!(moved, [6.0, 22.0, 36.0, 8.0, -6.0, 5.0, 7.0, 8.0]);
+    let turn = Motion::turn([1.0, 2.0, 3.0], 1.0);
+    assert!(
+        turn.place(&[Part::Box], &[0.0, 0.0, 0.0, 1.0, 1.0, 1.0])
+            .is_err()
+    );
+    assert!(turn.place(&[Part::Point], &[1.0]).is_err());
+    assert!(Motion::scale(900).place(&[Part::Length], &[1e300]).is_err());
 }
 
 #[test]
@@ -80,21 +108,38 @@ fn elements_are_rearranged_and_stay_the_same() {
         all
     };
     let wanted = corners(&mesh);
-    for step in [Step::VertexOrder, Step::FaceOrder, Step::SplitVertices] {
+    for step in [
+        Step::Plain(Change::VertexOrder),
+        Step::Plain(Change::FaceOrder),
+        Step::Plain(Change::SplitVertices),
+    ] {
         let changed = step.apply(&mesh, 7).expect("a mesh").mesh;
         assert_eq!(changed.check(), Ok(()));
         assert_eq!(corners(&changed), wanted, "{step:?}");
         assert!(changed != mesh, "{step:?}");
     }
-    let split = Step::SplitVertices.apply(&mesh, 0).expect("a mesh").mesh;
+    let split = Step::Plain(Change::SplitVertices)
+        .apply(&mesh, 0)
+        .expect("a mesh")
+        .mesh;
     assert_eq!(split.positions.len(), 3 * mesh.triangles.len());
-    let twice = Step::DuplicateFaces.apply(&mesh, 0).expect("a mesh").mesh;
+    let twice = Step::Plain(Change::DuplicateFaces)
+        .apply(&mesh, 0)
+        .expect("a mesh")
+        .mesh;
     assert_eq!(twice.triangles.len(), 2 * mesh.triangles.len());
-    let more = Step::DegenerateFaces.apply(&mesh, 0).expect("a mesh").mesh;
+    let more = Step::Plain(Change::DegenerateFaces)
+        .apply(&mesh, 0)
+        .expect("a mesh")
+        .mesh;
     let flat = &more.triangles[mesh.triangles.len()..];
     assert!(flat.len() == 64 && flat.iter().all(|[a, b, c]| b == c || a == b));
-    assert!(Step::DegenerateFaces.apply(&Mesh::default(), 0).is_err());
-    let jitter = Step::Jitter.apply(&mesh, 0).expect("a mesh");
+    assert!(
+        Step::Plain(Change::DegenerateFaces)
+            .apply(&Mesh::default(), 0)
+            .is_err()
+    );
+    let jitter = Step::Plain(Change::Jitter).apply(&mesh, 0).expect("a mesh");
     assert_eq!(jitter.rounding.ulps, 1.0);
 }
 
@@ -167,7 +212,7 @@ fn voxels_that_moved_along_did_not_drift() {
 #[test]
 fn meshes_drift_by_their_distance() {
     let mesh = torus_knot(2, 3, 3.0, 32, 6);
-    let changed = Step::Turn.apply(&mesh, 0).expect("a mesh");
+    let changed = Step::Plain(Change::Turn).apply(&mesh, 0).expect("a mesh");
     let drift = mesh_drift(&mesh, &changed.mesh, &changed.motion).expect("meshes");
     assert!(drift.distance.is_some_and(|d| d < 1e-12), "{drift:?}");
     let off = Motion::shift([0.0, 0.0, 0.5]);

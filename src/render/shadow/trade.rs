@@ -1,6 +1,6 @@
 //! The trade that shadows are: fewer rays, coarser voxels.
 
-use crate::trade::{Change, Invariance, Knob, Measure, Trade};
+use crate::trade::{Change, Invariance, Knob, Measure, Part, Placed, Trade};
 
 /// The measure that compares methods, resolutions and numbers of rays.
 pub(super) const SOFT: Measure = Measure {
@@ -40,8 +40,16 @@ pub const TRADE: Trade = Trade {
     error: SOFT,
     reference: "other rays by watertight triangles",
     result: "png",
-    lengths: &[],
-    points: &[],
+    placed: &[
+        Placed {
+            option: "light",
+            parts: &[Part::Point, Part::Length],
+        },
+        Placed {
+            option: "camera",
+            parts: &[Part::Point, Part::Point, Part::Direction, Part::Number],
+        },
+    ],
     invariant: &[
         Invariance::always(Change::Scale),
         Invariance::always(Change::Shift),

@@ -1,6 +1,6 @@
 //! The trade that voxelizing is: finer voxels, looser rules.
 
-use crate::trade::{Change, Invariance, Knob, Measure, Trade};
+use crate::trade::{Change, Invariance, Knob, Measure, Part, Placed, Trade};
 
 /// The measure that compares resolutions, modes and fills.
 pub(super) const TWO_SIDED: Measure = Measure {
@@ -41,8 +41,16 @@ pub const TRADE: Trade = Trade {
     error: TWO_SIDED,
     reference: "exact closest points of the model and its samples",
     result: "svo",
-    lengths: &["voxel-size"],
-    points: &["bounds"],
+    placed: &[
+        Placed {
+            option: "voxel-size",
+            parts: &[Part::Length],
+        },
+        Placed {
+            option: "bounds",
+            parts: &[Part::Box],
+        },
+    ],
     invariant: &[
         Invariance::always(Change::Scale),
         Invariance::always(Change::Shift),
