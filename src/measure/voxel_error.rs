@@ -3,8 +3,10 @@
 //! Distances are measured by exact closest points, outsides by a flood fill, insides by winding
 //! number: none of it is the code that set the voxels.
 
+mod room;
+
 use super::surface::{Elements, Surface};
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::mesh::Mesh;
 use crate::numeric::vector::{Vec3, add, cross, length, scale, sub};
 use crate::progress::Progress;
@@ -17,6 +19,7 @@ use crate::volume::octree::Octree;
 use crate::volume::voxelize::{self, Fill, Lattice, Mode, Storage, touches};
 use crate::volume::{Data, Volume};
 use rayon::prelude::*;
+use room::Room;
 use schemars::JsonSchema;
 use serde::Serialize;
 
@@ -62,7 +65,7 @@ pub struct VoxelError {
 ///
 /// Cost: a nearest-element search for every set voxel and, outside of them, for every sample of the
 /// surface, of which there are about 64 to a voxel face. Memory: three to five more grids, a copy of
-/// the mesh, and trees over its elements and over the runs of set voxels; [`Error::Limit`] refuses
+/// the mesh, and trees over its elements and over the runs of set voxels; [`crate::error::Error::Limit`] refuses
 /// what of it would go over `params.max_memory`.
 pub fn measure(
     mesh: &Mesh,
@@ -145,57 +148,6 @@ pub fn measure(
         conservative_voxels: conservative.count_set(),
         not_conservative: by_rule.map_or(0, |surface| outside_of(surface, &conservative)),
     })
-}
-
-/// What the reference takes of the memory that there is.
-struct Room {
-    needed: u128,
-    limit: u64,
-}
-
-impl Room {
-    /// Bytes for each item of a tree while it is built, and for a box.
-    const PER_RUN: u128 = 56 + size_of::<Aabb>() as u128;
-    /// Bytes for each element: indices of the copy and of the tree, corners, the tree's own.
-    const PER_ELEMENT: u128 = 2 * 12 + 72 + 56;
-    /// Bytes for each vertex: its place in the copy, and that in the tree with its index.
-    const PER_VERTEX: u128 = 24 + 32;
-
-    /// The grids, where their size is known beforehand, and the mesh.
-    fn new(
-        mesh: &Mesh,
-        made: &Volume,
-        params: &voxelize::Params,
-        lattice: &Lattice,
-    ) -> Result<Room> {
-        let surface = !matches!(params.mode, Mode::Conservative | Mode::None);
-        let solid = params.fill != Fill::None;
-        let inside = !mesh.triangles.is_empty();
-        let grids = 3 + u128::from(surface) + u128::from(solid) + u128::from(inside);
-        let grid = match made.data {
-            Data::Sparse(_) => 0,
-            _ => BitGrid::bytes_for(lattice.dims),
-        };
-        let elements = mesh.triangles.len() + mesh.segments.len() + mesh.points.len();
-        let room = Room {
-            needed: grids * grid
-                + elements as u128 * Room::PER_ELEMENT
-                + mesh.positions.len() as u128 * Room::PER_VERTEX,
-            limit: params.max_memory,
-        };
-        room.expect(0)?;
-        Ok(room)
-    }
-
-    /// Errs when a tree over so many runs of voxels more is too much.
-    fn expect(&self, runs: usize) -> Result<()> {
-        let needed = self.needed + runs as u128 * Room::PER_RUN;
-        if needed <= u128::from(self.limit) {
-            return Ok(());
-        }
-        let hint = Some("raise --max-memory, or leave --verify out");
-        Err(Error::over_memory("verifying", needed, self.limit, hint))
-    }
 }
 
 impl VoxelError {

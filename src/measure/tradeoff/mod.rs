@@ -323,8 +323,8 @@ impl Plan<'_> {
     }
 
     /// Seconds of a verifying and of a timed run, from the neighbours one step down each knob: each
-    /// is taken to grow as it did on the step before, and the largest prediction counts. `None`
-    /// while one of the neighbours has not been tried.
+    /// is taken to grow as it did on the step before, or on the same step beside, whichever is more,
+    /// and the largest prediction counts. `None` while one of the neighbours has not been tried.
     fn predicted(&self, index: usize) -> Option<(f64, f64)> {
         let mut most = (0.0f64, 0.0f64);
         for axis in 0..self.grid.axes.len() {
@@ -333,18 +333,32 @@ impl Plan<'_> {
             };
             let near = &self.tried[below];
             near.verified.as_ref()?;
-            let before = grid::step_down(&self.settings, index, axis, 2);
+            let steps = self.steps_like(index, below, axis);
             let growth = |of: fn(&Tried) -> f64| {
                 let assumed = self.grid.assumed_growth(axis, &self.settings[index]);
-                let seen = before
-                    .map(|b| of(near) / of(&self.tried[b]))
-                    .filter(|seen| seen.is_finite() && *seen > 0.0);
+                let seen = steps
+                    .iter()
+                    .map(|[from, to]| of(&self.tried[*to]) / of(&self.tried[*from]))
+                    .filter(|seen| seen.is_finite() && *seen > 0.0)
+                    .reduce(f64::max);
                 seen.map_or(assumed, |seen| seen.max(1.0)) * of(near)
             };
             most.0 = most.0.max(growth(|t| t.verify_s));
             most.1 = most.1.max(growth(|t| t.timed_s));
         }
         Some(most)
+    }
+
+    /// Steps along an axis that tell how much the one from `below` to `index` takes more: the one
+    /// before it, and those beside it that are one step down another axis.
+    fn steps_like(&self, index: usize, below: usize, axis: usize) -> Vec<[usize; 2]> {
+        let down = |from, axis, steps| grid::step_down(&self.settings, from, axis, steps);
+        let before = down(index, axis, 2).map(|before| [before, below]);
+        let others = (0..self.grid.axes.len()).filter(|other| *other != axis);
+        let beside = others.filter_map(|b| Some([down(below, b, 1)?, down(index, b, 1)?]));
+        let tried = |i: &usize| self.tried[*i].verified.is_some();
+        let all = before.into_iter().chain(beside);
+        all.filter(|step| step.iter().all(tried)).collect()
     }
 
     /// Timed rounds over all that has not failed, to and fro.

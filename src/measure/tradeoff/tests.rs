@@ -140,6 +140,22 @@ fn a_budget_takes_the_cheapest_first_and_is_not_overrun() {
 }
 
 #[test]
+fn what_a_step_took_beside_tells_what_it_will_take() {
+    // Numbers are taken to cost by the cube while nothing is known; here they hardly cost more.
+    let seconds = |s: &[usize]| 1.2f64.powi(s[0] as i32) * (1.0 + 0.1 * s[1] as f64);
+    let machine = Machine::new(&seconds, &|s| Some(1.0 / (1 + s[0]) as f64));
+    let params = Params {
+        budget_s: Some(900.0),
+        ..Params::DEFAULT
+    };
+    let rows = machine.run(&grid(&[&[1.0, 4.0, 16.0], &[1.0, 1.1, 1.2]]), &params);
+    assert!(
+        rows.iter()
+            .all(|row| row.status == Status::Done && row.runs == 3)
+    );
+}
+
+#[test]
 fn the_first_is_run_whatever_the_budget() {
     let machine = Machine::new(&|_| 1.0, &|_| Some(0.5));
     let params = Params {
