@@ -30,6 +30,8 @@ pub struct Knob {
     /// Whether its values are numbers, of which the smaller are cheaper; else they are names, and
     /// what the ladder leaves out is cheaper than all of it.
     pub numeric: bool,
+    /// Knobs, and a value of each, with which this one has no effect.
+    pub idle: &'static [(&'static str, &'static str)],
 }
 
 /// An option whose value stands in the input's space.

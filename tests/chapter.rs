@@ -31,7 +31,7 @@ const PARTS: &[Part] = &[
     Part {
         command: "shadow",
         words: "fixtures/shapes/torus-knot.ply --size 128x96",
-        vary: "--vary method --vary resolution=32,128,512 --vary rays=1,16 --repeat 3",
+        vary: "--vary method --vary resolution=32,128,512 --vary rays=1,16,64 --repeat 3",
         advice: ADVICE_ON_SHADOW,
         extremes: "--resolution 48 --rays 4",
     },
@@ -65,7 +65,11 @@ fn table(report: &Value) -> Vec<(String, String)> {
         let setting = row["setting"].as_object().expect("a setting");
         let mut fixed: Vec<String> = setting
             .values()
-            .map(|v| v.as_str().map_or_else(|| v.to_string(), str::to_owned))
+            .map(|v| match v {
+                Value::Null => "-".to_owned(),
+                Value::String(name) => name.clone(),
+                number => number.to_string(),
+            })
             .collect();
         let share = row["modelled"]["share"].as_f64().expect("a share");
         fixed.extend([

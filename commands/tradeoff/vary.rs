@@ -1,7 +1,7 @@
 //! `--vary`: the knobs, and the values that each is to have.
 
 use crate::wrapped::Wrapped;
-use scantle::measure::tradeoff::{Axis, Grid};
+use scantle::measure::tradeoff::{Axis, Grid, Idle};
 use scantle::trade::Knob;
 use serde_json::{Map, Value};
 use std::collections::BTreeSet;
@@ -47,8 +47,19 @@ impl Knobs {
                 None
             },
         };
+        let mut idle = Vec::new();
+        for (axis, (knob, _)) in self.all.iter().enumerate() {
+            for (other, value) in knob.idle {
+                let by = self.all.iter().position(|(knob, _)| knob.name == *other);
+                let index = |by: usize| self.all[by].1.iter().position(|v| v == value);
+                if let Some((by, value)) = by.and_then(|by| Some((by, index(by)?))) {
+                    idle.push(Idle { axis, by, value });
+                }
+            }
+        }
         Grid {
             axes: self.all.iter().map(axis).collect(),
+            idle,
         }
     }
 
@@ -59,33 +70,38 @@ impl Knobs {
             .map(|(knob, values)| (knob.name, values.as_slice()))
     }
 
-    /// The values of a setting.
-    pub fn values<'a>(&'a self, setting: &'a [usize]) -> impl Iterator<Item = &'a str> {
-        let all = self.all.iter().zip(setting);
-        all.map(|((_, values), index)| values[*index].as_str())
+    /// The knobs that have an effect in a setting, with their values; `None` for those that have none.
+    fn values<'a>(
+        &'a self,
+        setting: &'a [usize],
+    ) -> impl Iterator<Item = (&'static Knob, Option<&'a str>)> {
+        let grid = self.grid();
+        let all = self.all.iter().zip(setting).enumerate();
+        all.map(move |(axis, ((knob, values), index))| {
+            let value = values[*index].as_str();
+            (*knob, (!grid.is_idle(setting, axis)).then_some(value))
+        })
     }
 
     /// The options that make a setting.
     pub fn options(&self, setting: &[usize]) -> Vec<(String, Option<String>)> {
-        let names = self.iter().map(|(name, _)| name.to_owned());
-        let values = self.values(setting).map(|value| Some(value.to_owned()));
-        names.zip(values).collect()
+        self.values(setting)
+            .filter_map(|(knob, value)| Some((knob.name.to_owned(), Some(value?.to_owned()))))
+            .collect()
     }
 
-    /// A setting for the report: numbers where the knob has numbers.
+    /// A setting for the report: numbers where the knob has numbers, null where it has no effect.
     pub fn setting(&self, setting: &[usize]) -> Map<String, Value> {
         let number = |text: &str| serde_json::from_str(text).unwrap_or_else(|_| text.into());
-        let entries = self.all.iter().zip(self.values(setting));
-        entries
-            .map(|((knob, _), value)| {
-                let value = if knob.numeric {
-                    number(value)
-                } else {
-                    value.into()
-                };
-                (knob.name.to_owned(), value)
-            })
-            .collect()
+        let entries = self.values(setting).map(|(knob, value)| {
+            let value = match value {
+                None => Value::Null,
+                Some(value) if knob.numeric => number(value),
+                Some(value) => value.into(),
+            };
+            (knob.name.to_owned(), value)
+        });
+        entries.collect()
     }
 }
 

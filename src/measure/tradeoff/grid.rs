@@ -14,11 +14,25 @@ pub struct Axis {
 pub struct Grid {
     /// The knobs.
     pub axes: Vec<Axis>,
+    /// What has no effect: a knob, with a value of another knob.
+    pub idle: Vec<Idle>,
+}
+
+/// A knob that has no effect where another has a certain value.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Idle {
+    /// Which knob.
+    pub axis: usize,
+    /// Which other.
+    pub by: usize,
+    /// Its value, from 0.
+    pub value: usize,
 }
 
 impl Grid {
     /// The settings in the order of cost as far as that is known beforehand: none stands before one
-    /// that is cheaper in some knob and dearer in none. Each names a value of each knob, from 0.
+    /// that is cheaper in some knob and dearer in none. Each names a value of each knob, from 0; a
+    /// knob without effect stays at its first, so that no setting stands there twice.
     pub fn settings(&self) -> Vec<Vec<usize>> {
         let mut all = vec![Vec::new()];
         for axis in &self.axes {
@@ -33,9 +47,18 @@ impl Grid {
                 })
                 .collect();
         }
+        all.retain(|setting| {
+            (0..setting.len()).all(|a| setting[a] == 0 || !self.is_idle(setting, a))
+        });
         // The sort is stable: settings of one sum stay in the order of their values.
         all.sort_by_key(|setting| setting.iter().sum::<usize>());
         all
+    }
+
+    /// Whether a knob has no effect in a setting.
+    pub fn is_idle(&self, setting: &[usize], axis: usize) -> bool {
+        let mut idle = self.idle.iter().filter(|idle| idle.axis == axis);
+        idle.any(|idle| setting[idle.by] == idle.value)
     }
 
     /// How much dearer a setting is taken to be than its neighbour one step down an axis while

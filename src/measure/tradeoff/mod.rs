@@ -6,7 +6,7 @@ mod choice;
 mod grid;
 
 pub use choice::{Choice, Limits, choose};
-pub use grid::{Axis, Grid};
+pub use grid::{Axis, Grid, Idle};
 
 use crate::progress::Progress;
 use crate::report::Modelled;

@@ -9,6 +9,7 @@ fn grid(shape: &[&[f64]]) -> Grid {
     });
     Grid {
         axes: axes.collect(),
+        idle: Vec::new(),
     }
 }
 
@@ -94,6 +95,20 @@ fn settings_stand_after_all_that_are_cheaper_in_every_knob() {
         }
     }
     assert_eq!(grid(&[]).settings(), [Vec::<usize>::new()]);
+}
+
+#[test]
+fn a_knob_without_effect_stays_where_it_is() {
+    let mut grid = grid(&[&[1.0, 2.0], &[1.0, 2.0, 3.0]]);
+    grid.idle = vec![Idle {
+        axis: 1,
+        by: 0,
+        value: 1,
+    }];
+    let settings = grid.settings();
+    let found: Vec<&[usize]> = settings.iter().map(Vec::as_slice).collect();
+    assert_eq!(found, [[0, 0], [0, 1], [1, 0], [0, 2]]);
+    assert!(grid.is_idle(&[1, 2], 1) && !grid.is_idle(&[0, 2], 1) && !grid.is_idle(&[1, 2], 0));
 }
 
 #[test]

@@ -54,7 +54,7 @@ pub fn draw(mesh: &Mesh, params: &Params, progress: &dyn Progress) -> Result<(Ra
     let caster = model.caster(params, progress)?;
     let (raster, tally) = picture::draw(&model, &caster, params, progress);
     let mut stats = model.stats(params, &caster, tally);
-    stats.camera = Some(model.shot());
+    stats.camera = Some(params.camera.map_or_else(|| model.shot(), Shot::from));
     Ok((raster, stats))
 }
 
@@ -230,7 +230,7 @@ impl Model {
         sums.into_iter().map(normalize).collect()
     }
 
-    /// The camera, in the mesh's unit.
+    /// The camera of no other, in the mesh's unit.
     fn shot(&self) -> Shot {
         let Camera {
             target,

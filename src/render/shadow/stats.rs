@@ -1,7 +1,7 @@
 //! What was drawn, and how exact it is.
 
 use super::cast::Tally;
-use super::{Light, Method, REFERENCE_RAYS, trade};
+use super::{Light, Method, REFERENCE_RAYS, View, trade};
 use crate::report::{Accuracy, Modelled, Warning};
 use crate::volume::trace::Visits;
 use schemars::JsonSchema;
@@ -29,12 +29,24 @@ pub struct Shot {
     pub eye: [f64; 3],
     /// The point in the middle of the picture.
     pub target: [f64; 3],
-    /// The direction that is up in the picture, of length 1.
+    /// The direction that is up in the picture.
     pub up: [f64; 3],
     /// Angle from the bottom of the picture to its top, in degrees; null for parallel lines of sight.
     pub fov_deg: Option<f64>,
     /// Height of what is seen with parallel lines of sight; null for others.
     pub height: Option<f64>,
+}
+
+impl From<View> for Shot {
+    fn from(view: View) -> Self {
+        Shot {
+            eye: view.eye,
+            target: view.target,
+            up: view.up,
+            fov_deg: Some(view.fov_deg),
+            height: None,
+        }
+    }
 }
 
 /// How shadows differ from those of exact rays.

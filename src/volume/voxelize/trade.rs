@@ -15,27 +15,32 @@ pub const TRADE: Trade = Trade {
             name: "resolution",
             ladder: &["32", "64", "128", "256"],
             numeric: true,
+            idle: &[],
         },
         Knob {
             name: "mode",
             // `none` sets nothing unless a fill is asked for too.
             ladder: &["z", "three-axis", "conservative"],
             numeric: false,
+            idle: &[],
         },
         Knob {
             name: "fill",
             ladder: &["none", "parity", "winding"],
             numeric: false,
+            idle: &[],
         },
         Knob {
             name: "grid",
             ladder: &["auto", "dense", "sparse"],
             numeric: false,
+            idle: &[],
         },
         Knob {
             name: "levels",
             ladder: &["xyz", "xy"],
             numeric: false,
+            idle: &[],
         },
     ],
     error: TWO_SIDED,
