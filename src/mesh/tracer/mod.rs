@@ -6,7 +6,7 @@ mod triangle;
 use super::Mesh;
 use crate::numeric::vector::Vec3;
 use crate::spatial::aabb::Aabb;
-use crate::spatial::bvh4::{Bvh4, LEAF, NONE, Slabs};
+use crate::spatial::bvh4::{LEAF, NONE, Slabs, WideBvh};
 use crate::spatial::local::{LocalFrame, exponent_above, times_power_of_two};
 use packet::{Filter, Packet, Verdict};
 use rayon::prelude::*;
@@ -51,7 +51,7 @@ pub struct Tracer {
     frame: LocalFrame,
     /// The box around all triangles. This, and all that follows, is in the local frame.
     bounds: Aabb,
-    tree: Bvh4,
+    tree: WideBvh,
     packets: Vec<Packet>,
     /// By leaf the indices of the corners and of the triangles themselves.
     faces: Vec<[Face; LEAF]>,
@@ -75,7 +75,7 @@ impl Tracer {
             .map(|p| frame.to_local(*p))
             .collect();
         let triangle = |t: u32| mesh.triangles[t as usize].map(|v| corners[v as usize]);
-        let (tree, leaves) = Bvh4::build(mesh.triangles.len() as u32, |t| {
+        let (tree, leaves) = WideBvh::build(mesh.triangles.len() as u32, |t| {
             let triangle = triangle(t);
             if is_degenerate(triangle) {
                 Aabb::EMPTY
