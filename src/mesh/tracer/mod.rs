@@ -174,18 +174,21 @@ impl Tracer {
     #[inline(always)]
     fn meet(&self, aim: &Aim, leaf: usize, lane: usize) -> Option<(Meeting, u32)> {
         let (vertices, triangle) = self.faces[leaf][lane];
-        let meeting = aim.ray.meet(vertices.map(|v| self.corners[v as usize]))?;
+        let [a, b, c] = vertices;
+        let corner = |v: u32| self.corners[v as usize];
+        let meeting = aim.ray.meet([corner(a), corner(b), corner(c)])?;
         let within = aim.reach[0] <= meeting.t && meeting.t <= aim.reach[1];
         within.then_some((meeting, triangle))
     }
 
     /// The ray in the local frame, from where it enters the box around everything; `None` when it
     /// misses that.
-    #[inline]
+    #[inline(always)]
     fn aim(&self, ray: &Ray) -> Option<Aim> {
-        let size = |v: Vec3| v[0].abs().max(v[1].abs()).max(v[2].abs());
+        let size = |v: Vec3| larger(v[0].abs(), larger(v[1].abs(), v[2].abs()));
         let origin = self.frame.to_local(ray.origin);
-        let finite = |v: Vec3| v.iter().all(|c| c.is_finite());
+        // Only of a finite number is the product with 0 no NaN.
+        let finite = |v: Vec3| v[0] * 0.0 + v[1] * 0.0 + v[2] * 0.0 == 0.0;
         let length = size(ray.direction);
         if length == 0.0 || !finite(ray.direction) || !finite(origin) {
             return None;
@@ -236,7 +239,7 @@ impl Aim {
     /// `t` as the tree's walk counts, rounded up.
     #[inline(always)]
     fn limit(&self, t: f64) -> f32 {
-        let far = t.min(self.end) - self.start;
+        let far = smaller(t, self.end) - self.start;
         (far * (1.0 + 4.0 * f64::from(f32::EPSILON)) + 2.0 * self.error + 1e-30) as f32
     }
 
@@ -264,7 +267,7 @@ impl Aim {
 
 /// The part of `reach` in which a ray may be inside a box that is a little larger; `None` when
 /// there is none. `far` is the largest coordinate of the origin in size.
-#[inline]
+#[inline(always)]
 fn clip(
     bounds: Aabb,
     origin: Vec3,
@@ -287,10 +290,23 @@ fn clip(
         }
         let inverse = 1.0 / direction[a];
         let (lo, hi) = (lo * inverse, hi * inverse);
-        start = start.max(lo.min(hi));
-        end = end.min(lo.max(hi));
+        start = larger(smaller(lo, hi), start);
+        end = smaller(larger(lo, hi), end);
     }
     (start <= end).then_some([start, end])
+}
+
+/// The larger of two numbers, the second when either is NaN: one instruction, as [`f64::max`] is
+/// not.
+#[inline(always)]
+fn larger(a: f64, b: f64) -> f64 {
+    if a > b { a } else { b }
+}
+
+/// The smaller of two numbers; the second when either is NaN.
+#[inline(always)]
+fn smaller(a: f64, b: f64) -> f64 {
+    if a < b { a } else { b }
 }
 
 /// The corners that the groups name, in the order in which they do, which are renamed so.
