@@ -6,12 +6,15 @@ mod triangle;
 use super::Mesh;
 use crate::numeric::vector::Vec3;
 use crate::spatial::aabb::Aabb;
-use crate::spatial::bvh4::{Bvh4, LEAF, Leaf, NONE, Slabs};
+use crate::spatial::bvh4::{LEAF, NONE, Slabs, WideBvh};
 use crate::spatial::local::{LocalFrame, exponent_above, times_power_of_two};
-use packet::{Filter, Packet};
+use packet::{Filter, Packet, Verdict};
 use rayon::prelude::*;
 use std::ops::ControlFlow;
 use triangle::{Meeting, Sheared, is_degenerate};
+
+/// The indices of a triangle's corners and of itself.
+type Face = ([u32; 3], u32);
 
 /// A ray, or a segment of one.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -48,30 +51,21 @@ pub struct Tracer {
     frame: LocalFrame,
     /// The box around all triangles. This, and all that follows, is in the local frame.
     bounds: Aabb,
-    tree: Bvh4,
-    groups: Vec<Group>,
+    tree: WideBvh,
+    packets: Vec<Packet>,
+    /// By leaf the indices of the corners and of the triangles themselves.
+    faces: Vec<[Face; LEAF]>,
     /// Those of triangles alone, in the order in which the groups name them first: what a ray
     /// needs together lies together.
     corners: Vec<Vec3>,
 }
-
-/// The triangles of a leaf.
-#[derive(Debug, Clone, Copy)]
-#[repr(C)]
-struct Group {
-    packet: Packet,
-    /// The indices of their corners and of themselves.
-    faces: [([u32; 3], u32); LEAF],
-}
-
-const _: () = assert!(size_of::<Group>() == 224);
 
 impl Tracer {
     /// Lays out the triangles of a mesh; its coordinates are finite and its indices in range
     /// ([`Mesh::check`]), and it has fewer than 2^31 triangles.
     ///
     /// Vertices of no triangle have no influence. The same layout comes from any number of
-    /// threads. Cost: O(n log n) time and about 130 bytes per triangle.
+    /// threads. Cost: O(n log n) time and about 80 bytes per triangle.
     pub fn new(mesh: &Mesh) -> Self {
         let bounds = bounds_of_triangles(mesh);
         let frame = LocalFrame::around(bounds);
@@ -81,7 +75,7 @@ impl Tracer {
             .map(|p| frame.to_local(*p))
             .collect();
         let triangle = |t: u32| mesh.triangles[t as usize].map(|v| corners[v as usize]);
-        let (tree, leaves) = Bvh4::build(mesh.triangles.len() as u32, |t| {
+        let (tree, leaves) = WideBvh::build(mesh.triangles.len() as u32, |t| {
             let triangle = triangle(t);
             if is_degenerate(triangle) {
                 Aabb::EMPTY
@@ -89,16 +83,16 @@ impl Tracer {
                 Aabb::around(&triangle)
             }
         });
-        let group = |leaf: &Leaf| {
-            let items = leaf.map(|t| (t != NONE).then_some(t));
-            let face = |t: u32| (mesh.triangles[t as usize], t);
-            Group {
-                packet: Packet::new(items.map(|t| t.map(triangle))),
-                faces: items.map(|t| t.map_or(([0; 3], NONE), face)),
-            }
+        let packets = leaves
+            .par_iter()
+            .map(|leaf| Packet::new(leaf.map(|t| (t != NONE).then(|| triangle(t)))))
+            .collect();
+        let face = |t: u32| match mesh.triangles.get(t as usize) {
+            Some(vertices) => (*vertices, t),
+            None => ([0; 3], NONE),
         };
-        let mut groups: Vec<Group> = leaves.par_iter().map(group).collect();
-        let corners = in_order_of_use(&mut groups, &corners);
+        let mut faces: Vec<[Face; LEAF]> = leaves.par_iter().map(|leaf| leaf.map(face)).collect();
+        let corners = in_order_of_use(&mut faces, &corners);
         Tracer {
             frame,
             bounds: Aabb {
@@ -106,7 +100,8 @@ impl Tracer {
                 hi: frame.to_local(bounds.hi),
             },
             tree,
-            groups,
+            packets,
+            faces,
             corners,
         }
     }
@@ -121,22 +116,27 @@ impl Tracer {
     pub fn closest(&self, ray: &Ray) -> Option<Hit> {
         let aim = self.aim(ray)?;
         let mut best: Option<(Meeting, u32)> = None;
-        let _ = self
-            .tree
-            .walk(&aim.slabs, aim.limit(aim.reach[1]), |leaf, limit| {
-                let mut limit = limit;
-                self.meet(&aim, leaf, |meeting, triangle| {
-                    let closer = best.is_none_or(|(other, index)| {
-                        meeting.t < other.t || (meeting.t == other.t && triangle < index)
-                    });
-                    if closer {
-                        best = Some((meeting, triangle));
-                        limit = limit.min(aim.limit(meeting.t));
-                    }
-                    ControlFlow::Continue(())
-                })?;
-                ControlFlow::Continue(limit)
-            });
+        let mut limit = aim.limit(aim.reach[1]);
+        let mut span = aim.span(aim.reach[1]);
+        let _ = self.tree.walk(&aim.slabs, limit, |leaf, _| {
+            let Verdict { mut open, .. } = aim.filter.look(&self.packets[leaf], span);
+            while open != 0 {
+                let lane = open.trailing_zeros() as usize % LEAF;
+                open &= open - 1;
+                let Some((meeting, triangle)) = self.meet(&aim, leaf, lane) else {
+                    continue;
+                };
+                let closer = best.is_none_or(|(other, index)| {
+                    meeting.t < other.t || (meeting.t == other.t && triangle < index)
+                });
+                if closer {
+                    best = Some((meeting, triangle));
+                    limit = limit.min(aim.limit(meeting.t));
+                    span = aim.span(meeting.t);
+                }
+            }
+            ControlFlow::Continue(limit)
+        });
         best.map(|(meeting, triangle)| aim.hit(meeting, triangle))
     }
 
@@ -147,9 +147,16 @@ impl Tracer {
         let Some(aim) = self.aim(ray) else {
             return false;
         };
+        let limit = aim.limit(aim.reach[1]);
+        let span = aim.span(aim.reach[1]);
         self.tree
-            .walk(&aim.slabs, aim.limit(aim.reach[1]), |leaf, limit| {
-                self.meet(&aim, leaf, |_, _| ControlFlow::Break(()))?;
+            .walk(&aim.slabs, limit, |leaf, limit| {
+                let Verdict { open, met } = aim.filter.look(&self.packets[leaf], span);
+                let doubtful =
+                    |lane| open >> lane & 1 != 0 && self.meet(&aim, leaf, lane).is_some();
+                if met != 0 || (open != 0 && (0..LEAF).any(doubtful)) {
+                    return ControlFlow::Break(());
+                }
                 ControlFlow::Continue(limit)
             })
             .is_break()
@@ -157,42 +164,31 @@ impl Tracer {
 
     /// Bytes that the layout takes.
     pub fn bytes(&self) -> u64 {
-        let lists = size_of_val(self.groups.as_slice()) + size_of_val(self.corners.as_slice());
+        let lists = size_of_val(self.packets.as_slice())
+            + size_of_val(self.faces.as_slice())
+            + size_of_val(self.corners.as_slice());
         self.tree.bytes() + lists as u64
     }
 
-    /// Calls `found` for the triangles of a leaf that the ray meets within its reach.
+    /// Where the ray meets a leaf's triangle within its reach.
     #[inline(always)]
-    fn meet(
-        &self,
-        aim: &Aim,
-        leaf: usize,
-        mut found: impl FnMut(Meeting, u32) -> ControlFlow<()>,
-    ) -> ControlFlow<()> {
-        let group = &self.groups[leaf];
-        let mut candidates = aim.filter.candidates(&group.packet);
-        while candidates != 0 {
-            let lane = candidates.trailing_zeros() as usize % LEAF;
-            candidates &= candidates - 1;
-            let (vertices, triangle) = group.faces[lane];
-            let corners = vertices.map(|v| self.corners[v as usize]);
-            if let Some(meeting) = aim.ray.meet(corners)
-                && aim.reach[0] <= meeting.t
-                && meeting.t <= aim.reach[1]
-            {
-                found(meeting, triangle)?;
-            }
-        }
-        ControlFlow::Continue(())
+    fn meet(&self, aim: &Aim, leaf: usize, lane: usize) -> Option<(Meeting, u32)> {
+        let (vertices, triangle) = self.faces[leaf][lane];
+        let [a, b, c] = vertices;
+        let corner = |v: u32| self.corners[v as usize];
+        let meeting = aim.ray.meet([corner(a), corner(b), corner(c)])?;
+        let within = aim.reach[0] <= meeting.t && meeting.t <= aim.reach[1];
+        within.then_some((meeting, triangle))
     }
 
     /// The ray in the local frame, from where it enters the box around everything; `None` when it
     /// misses that.
-    #[inline]
+    #[inline(always)]
     fn aim(&self, ray: &Ray) -> Option<Aim> {
-        let size = |v: Vec3| v[0].abs().max(v[1].abs()).max(v[2].abs());
+        let size = |v: Vec3| larger(v[0].abs(), larger(v[1].abs(), v[2].abs()));
         let origin = self.frame.to_local(ray.origin);
-        let finite = |v: Vec3| v.iter().all(|c| c.is_finite());
+        // Only of a finite number is the product with 0 no NaN.
+        let finite = |v: Vec3| v[0] * 0.0 + v[1] * 0.0 + v[2] * 0.0 == 0.0;
         let length = size(ray.direction);
         if length == 0.0 || !finite(ray.direction) || !finite(origin) {
             return None;
@@ -243,8 +239,19 @@ impl Aim {
     /// `t` as the tree's walk counts, rounded up.
     #[inline(always)]
     fn limit(&self, t: f64) -> f32 {
-        let far = t.min(self.end) - self.start;
+        let far = smaller(t, self.end) - self.start;
         (far * (1.0 + 4.0 * f64::from(f32::EPSILON)) + 2.0 * self.error + 1e-30) as f32
+    }
+
+    /// The part of the main axis, from where the ray starts, up to some `t`.
+    #[inline(always)]
+    fn span(&self, t: f64) -> [f64; 2] {
+        let z = [self.reach[0], t].map(|t| (t - self.start) * self.ray.along);
+        if self.ray.along < 0.0 {
+            [z[1], z[0]]
+        } else {
+            z
+        }
     }
 
     #[inline]
@@ -260,7 +267,7 @@ impl Aim {
 
 /// The part of `reach` in which a ray may be inside a box that is a little larger; `None` when
 /// there is none. `far` is the largest coordinate of the origin in size.
-#[inline]
+#[inline(always)]
 fn clip(
     bounds: Aabb,
     origin: Vec3,
@@ -283,17 +290,30 @@ fn clip(
         }
         let inverse = 1.0 / direction[a];
         let (lo, hi) = (lo * inverse, hi * inverse);
-        start = start.max(lo.min(hi));
-        end = end.min(lo.max(hi));
+        start = larger(smaller(lo, hi), start);
+        end = smaller(larger(lo, hi), end);
     }
     (start <= end).then_some([start, end])
 }
 
+/// The larger of two numbers, the second when either is NaN: one instruction, as [`f64::max`] is
+/// not.
+#[inline(always)]
+fn larger(a: f64, b: f64) -> f64 {
+    if a > b { a } else { b }
+}
+
+/// The smaller of two numbers; the second when either is NaN.
+#[inline(always)]
+fn smaller(a: f64, b: f64) -> f64 {
+    if a < b { a } else { b }
+}
+
 /// The corners that the groups name, in the order in which they do, which are renamed so.
-fn in_order_of_use(groups: &mut [Group], corners: &[Vec3]) -> Vec<Vec3> {
+fn in_order_of_use(faces: &mut [[Face; LEAF]], corners: &[Vec3]) -> Vec<Vec3> {
     let mut renamed = vec![NONE; corners.len()];
     let mut used = Vec::with_capacity(corners.len());
-    let faces = groups.iter_mut().flat_map(|group| &mut group.faces);
+    let faces = faces.iter_mut().flatten();
     for (vertices, _) in faces.filter(|(_, triangle)| *triangle != NONE) {
         for vertex in vertices {
             let name = &mut renamed[*vertex as usize];

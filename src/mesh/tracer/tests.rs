@@ -100,8 +100,10 @@ fn assert_as_all(mesh: &Mesh, rays: u64) {
             // Reach includes its ends, and what is just closer is left out.
             ray.reach = [hit.t, hit.t];
             assert_eq!(tracer.closest(&ray), Some(hit), "ray {i}");
+            assert!(tracer.any(&ray), "ray {i}");
             ray.reach = [hit.t.next_up(), f64::INFINITY];
             let next = tracer.closest(&ray);
+            assert_eq!(tracer.any(&ray), next.is_some(), "ray {i}");
             assert_eq!(next, closest_of_all(&tracer, mesh, &ray), "ray {i}");
             1
         })
@@ -414,8 +416,7 @@ fn the_layout_ignores_threads() {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
         let pool = pool.expect("threads can be started");
         let tracer = pool.install(|| Tracer::new(&mesh));
-        let faces: Vec<_> = tracer.groups.iter().map(|group| group.faces).collect();
-        (tracer.tree, faces, tracer.corners)
+        (tracer.tree, tracer.packets, tracer.faces, tracer.corners)
     };
     assert!(on(1) == on(3));
 }

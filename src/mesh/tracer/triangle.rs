@@ -1,5 +1,6 @@
 //! One ray against one triangle, with exact decisions.
 
+use super::{larger, smaller};
 use crate::numeric::predicates::orient2d;
 use crate::numeric::vector::{Vec3, sub};
 use crate::spatial::local::{exponent_above, times_power_of_two};
@@ -32,6 +33,7 @@ pub(super) struct Meeting {
 
 impl Sheared {
     /// A ray whose direction is finite and not zero.
+    #[inline(always)]
     pub fn new(origin: Vec3, direction: Vec3) -> Self {
         let size = direction.map(f64::abs);
         let z = (1..3).fold(0, |z, a| if size[a] > size[z] { a } else { z });
@@ -67,14 +69,15 @@ impl Sheared {
     /// intersection".
     #[inline(always)]
     pub fn meet(&self, corners: [Vec3; 3]) -> Option<Meeting> {
-        let [a, b, c] = corners.map(|p| self.see(p));
+        let [a, b, c] = corners;
+        let (a, b, c) = (self.see(a), self.see(b), self.see(c));
         let (cb, bc) = (c[0] * b[1], c[1] * b[0]);
         let (ac, ca) = (a[0] * c[1], a[1] * c[0]);
         let (ba, ab) = (b[0] * a[1], b[1] * a[0]);
         // Rounding is monotone: a difference that is not 0 has the sign of the exact one.
         let weights = [cb - bc, ac - ca, ba - ab];
-        let least = weights[0].min(weights[1]).min(weights[2]);
-        let most = weights[0].max(weights[1]).max(weights[2]);
+        let least = smaller(weights[0], smaller(weights[1], weights[2]));
+        let most = larger(weights[0], larger(weights[1], weights[2]));
         if least < 0.0 && most > 0.0 {
             return None;
         }

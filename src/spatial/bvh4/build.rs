@@ -1,6 +1,6 @@
-//! Building the tree: binned splits by surface area, four children a node.
+//! Building the tree: binned splits by surface area, eight children a node.
 
-use super::{Bvh4, IS_LEAF, LEAF, Leaf, NONE, Node};
+use super::{IS_LEAF, LEAF, Lanes, Leaf, NONE, Node, WIDTH, WideBvh};
 use crate::spatial::aabb::Aabb;
 use rayon::prelude::*;
 use std::ops::Range;
@@ -136,7 +136,7 @@ struct Part {
     bounds: Bounds,
 }
 
-pub(super) fn build(count: u32, bounds: impl Fn(u32) -> Aabb + Sync) -> (Bvh4, Vec<Leaf>) {
+pub(super) fn build(count: u32, bounds: impl Fn(u32) -> Aabb + Sync) -> (WideBvh, Vec<Leaf>) {
     let mut entries: Vec<Entry> = (0..count)
         .into_par_iter()
         .map(|item| Entry::new(item, bounds(item)))
@@ -150,7 +150,7 @@ pub(super) fn build(count: u32, bounds: impl Fn(u32) -> Aabb + Sync) -> (Bvh4, V
         grow(&mut entries, 0, whole, 0, &mut nodes);
     }
     let leaves = number(&mut nodes, &entries);
-    (Bvh4 { nodes }, leaves)
+    (WideBvh { nodes }, leaves)
 }
 
 /// Turns links that count from a node into indices of nodes, and places of entries into numbers of
@@ -224,39 +224,37 @@ impl Part {
 impl Node {
     /// A node whose leaves link to places of entries, and whose other links are yet to be made.
     fn around(parts: &[Part], first: usize) -> Node {
-        let mut planes = [[f32::INFINITY; 4]; 6];
-        for upper in [1, 3, 5] {
-            planes[upper] = [f32::NEG_INFINITY; 4];
-        }
+        // Inside out where there is no child.
+        let mut planes = [[[f32::INFINITY; WIDTH], [f32::NEG_INFINITY; WIDTH]]; 3];
         let mut node = Node {
-            planes: [f32x4::ZERO; 6],
-            link: [0; 4],
-            count: [0; 4],
+            planes: [[Lanes::ZERO; 2]; 3],
+            link: [0; WIDTH],
+            count: [0; WIDTH],
         };
         for (child, part) in parts.iter().enumerate() {
             let (lo, hi) = (part.bounds.all.lo.to_array(), part.bounds.all.hi.to_array());
             for axis in 0..3 {
-                planes[2 * axis][child] = lo[axis];
-                planes[2 * axis + 1][child] = hi[axis];
+                planes[axis][0][child] = lo[axis];
+                planes[axis][1][child] = hi[axis];
             }
             if part.is_leaf() {
                 node.link[child] = (first + part.range.start) as u32;
                 node.count[child] = part.range.len() as u32;
             }
         }
-        node.planes = std::array::from_fn(|p| f32x4::new(planes[p]));
+        node.planes = planes.map(|pair| pair.map(Lanes::new));
         node
     }
 }
 
-/// Orders the entries into up to four parts: the largest that is no leaf is split until then.
+/// Orders the entries into up to eight parts: the largest that is no leaf is split until then.
 fn children(entries: &mut [Entry], whole: Bounds, depth: u32) -> Vec<Part> {
-    let mut parts = Vec::with_capacity(4);
+    let mut parts = Vec::with_capacity(WIDTH);
     parts.push(Part {
         range: 0..entries.len(),
         bounds: whole,
     });
-    while parts.len() < 4 {
+    while parts.len() < WIDTH {
         let area = |part: &Part| part.bounds.all.half_area();
         let largest = (0..parts.len())
             .filter(|p| !parts[*p].is_leaf())

@@ -1,4 +1,4 @@
-//! A bounding volume hierarchy for rays: four children a node, tested at once.
+//! A bounding volume hierarchy for rays: eight children a node, tested at once.
 
 mod build;
 
@@ -6,13 +6,15 @@ use super::aabb::Aabb;
 use crate::error::Fault;
 use crate::numeric::vector::Vec3;
 use std::ops::ControlFlow;
-use wide::f32x4;
+use wide::f32x8 as Lanes;
 
 /// Items of a leaf.
 pub const LEAF: usize = 4;
 /// The place in a leaf that holds no item.
 pub const NONE: u32 = u32::MAX;
 
+/// Children of a node, and lanes of its planes.
+const WIDTH: usize = 8;
 /// Marks the link to a leaf.
 const IS_LEAF: u32 = 1 << 31;
 /// Nodes that a walk keeps without asking for memory; a tree of a million items needs fewer.
@@ -26,19 +28,19 @@ const SLACK: f64 = 1.0 / (1u64 << 22) as f64;
 /// 16 they stay within [`SLACK`].
 const FLAT: f64 = 1.0 / (1u64 << 40) as f64;
 
-/// Four boxes and what is in them. A missing child has an inside-out box that no ray meets.
+/// Boxes and what is in them. A missing child has an inside-out box that no ray meets.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[repr(C, align(64))]
 struct Node {
-    /// Lower and upper x, lower and upper y, lower and upper z of the four boxes.
-    planes: [f32x4; 6],
+    /// Lower and upper x, lower and upper y, lower and upper z of the boxes.
+    planes: [[Lanes; 2]; 3],
     /// A leaf's number and [`IS_LEAF`], or the index of a node.
-    link: [u32; 4],
+    link: [u32; WIDTH],
     /// Items below, of a leaf; 0 for a node and for a missing child.
-    count: [u32; 4],
+    count: [u32; WIDTH],
 }
 
-const _: () = assert!(size_of::<Node>() == 128);
+const _: () = assert!(size_of::<Node>() == 256);
 
 /// A tree of boxes in `f32` over items that only the caller knows, by index; leaves hold up to
 /// [`LEAF`] of them.
@@ -46,7 +48,7 @@ const _: () = assert!(size_of::<Node>() == 128);
 /// For coordinates below 2 in size ([`super::local::LocalFrame`]). Boxes are rounded outwards and
 /// rays are widened by every rounding on the way, so that no leaf that a ray meets is passed by.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub struct Bvh4 {
+pub struct WideBvh {
     nodes: Vec<Node>,
 }
 
@@ -56,66 +58,68 @@ pub type Leaf = [u32; LEAF];
 /// A ray made ready for boxes.
 #[derive(Debug, Clone)]
 pub struct Slabs {
-    /// Index of the nearer plane of each axis among a node's planes.
+    /// By axis which of a box's two planes is nearer.
     near: [usize; 3],
     /// Origins moved towards the nearer and away from the farther planes.
-    origins: [[f32x4; 3]; 2],
+    origins: [[Lanes; 3]; 2],
     /// Inverse directions, made smaller for the nearer and larger for the farther planes.
-    inverses: [[f32x4; 3]; 2],
+    inverses: [[Lanes; 3]; 2],
 }
 
 impl Slabs {
     /// The ray from `origin`, below 4 in size, along `direction`, whose largest component is
     /// between 1 and 2 in size; its coordinates are off by up to `error`.
+    #[inline(always)]
     pub fn new(origin: Vec3, direction: Vec3, error: f64) -> Self {
         let slack = SLACK + error;
         let mut slabs = Slabs {
             near: [0; 3],
-            origins: [[f32x4::ZERO; 3]; 2],
-            inverses: [[f32x4::ZERO; 3]; 2],
+            origins: [[Lanes::ZERO; 3]; 2],
+            inverses: [[Lanes::ZERO; 3]; 2],
         };
         for axis in 0..3 {
             let down = direction[axis] < 0.0;
             let sign = if down { -1.0 } else { 1.0 };
-            let inverse = sign / direction[axis].abs().max(FLAT);
-            slabs.near[axis] = 2 * axis + usize::from(down);
+            let steep = direction[axis].abs();
+            let inverse = sign / if steep > FLAT { steep } else { FLAT };
+            slabs.near[axis] = usize::from(down);
             for (side, signed) in [(0, 1.0), (1, -1.0)] {
                 let moved = origin[axis] + signed * sign * slack;
-                slabs.origins[side][axis] = f32x4::splat(moved as f32);
+                slabs.origins[side][axis] = Lanes::splat(moved as f32);
                 let scaled = inverse * (1.0 - signed * GAMMA);
-                slabs.inverses[side][axis] = f32x4::splat(scaled as f32);
+                slabs.inverses[side][axis] = Lanes::splat(scaled as f32);
             }
         }
         slabs
     }
 
-    /// Where the ray enters the four boxes, at 0 or later, and which of them it meets by `limit`.
+    /// Where the ray enters a node's boxes, at 0 or later, and which of them it meets by `limit`.
     #[inline(always)]
-    fn enter(&self, node: &Node, limit: f32) -> (f32x4, u32) {
+    fn enter(&self, node: &Node, limit: f32) -> (Lanes, u32) {
         let at = |side: usize, axis: usize| {
-            // Planes come in pairs: the farther one is the other of the pair.
-            let plane = node.planes[self.near[axis] ^ side];
+            // Masked, as the compiler does not know that it is 0 or 1.
+            let plane = node.planes[axis][(self.near[axis] ^ side) & 1];
             (plane - self.origins[side][axis]) * self.inverses[side][axis]
         };
         // No product is NaN: inverses are finite and not 0, and so are the differences, or infinite.
         let near = at(0, 0)
             .fast_max(at(0, 1))
-            .fast_max(at(0, 2).fast_max(f32x4::ZERO));
+            .fast_max(at(0, 2).fast_max(Lanes::ZERO));
         let far = at(1, 0)
             .fast_min(at(1, 1))
-            .fast_min(at(1, 2).fast_min(f32x4::splat(limit)));
+            .fast_min(at(1, 2).fast_min(Lanes::splat(limit)));
         (near, near.simd_le(far).to_bitmask())
     }
 }
 
-impl Bvh4 {
+impl WideBvh {
     /// The tree over items `0..count` and its leaves by number. `bounds` gives an item's box: not
     /// NaN, below 2 in size. Items with an empty box are left out.
     ///
     /// The same tree comes from any number of threads. Fewer than 2^31 items. Cost: O(n log n)
-    /// time, 48 bytes per item while building and about 20 after. Source: binned surface area
+    /// time, 48 bytes per item while building and about 15 after. Source: binned surface area
     /// heuristic, Wald 2007, "On fast construction of SAH-based bounding volume hierarchies",
-    /// section 3; opening the largest child until there are four, Wald, Benthin, Boulos 2008,
+    /// section 3; opening the largest child until there are eight, Wald, Benthin, Boulos 2008,
     /// "Getting rid of packets", section 3.
     pub fn build(count: u32, bounds: impl Fn(u32) -> Aabb + Sync) -> (Self, Vec<Leaf>) {
         build::build(count, bounds)
@@ -184,7 +188,7 @@ impl Bvh4 {
                 return wrong(at, "is missing");
             };
             nodes_seen += 1;
-            for child in (0..4).filter(|c| !node.bounds(*c).is_empty()) {
+            for child in (0..WIDTH).filter(|c| !node.bounds(*c).is_empty()) {
                 let bounds_of_child = node.bounds(child);
                 if outer.union(bounds_of_child) != outer {
                     return wrong(at, "has a child outside the box for it");
@@ -216,10 +220,10 @@ impl Bvh4 {
 impl Node {
     /// The box of a child; empty for a missing one.
     fn bounds(&self, child: usize) -> Aabb {
-        let plane = |p: usize| f64::from(self.planes[p].to_array()[child]);
+        let planes = |side: usize| self.planes.map(|p| f64::from(p[side].to_array()[child]));
         Aabb {
-            lo: [plane(0), plane(2), plane(4)],
-            hi: [plane(1), plane(3), plane(5)],
+            lo: planes(0),
+            hi: planes(1),
         }
     }
 }
@@ -270,9 +274,9 @@ impl Stack {
 
     /// Puts the children in `mask` in, nearest last, but for the nearest, which is returned.
     #[inline(always)]
-    fn push_all(&mut self, near: &[f32; 4], link: &[u32; 4], mut mask: u32) -> Option<u32> {
+    fn push_all(&mut self, near: &[f32; WIDTH], link: &[u32; WIDTH], mut mask: u32) -> Option<u32> {
         let take = |mask: &mut u32| {
-            let child = mask.trailing_zeros() as usize & 3;
+            let child = mask.trailing_zeros() as usize & (WIDTH - 1);
             *mask &= *mask - 1;
             (near[child], link[child])
         };
@@ -285,21 +289,26 @@ impl Stack {
         }
         let mut b = take(&mut mask);
         order(&mut a, &mut b);
-        if mask != 0 {
-            let mut c = take(&mut mask);
-            order(&mut b, &mut c);
-            order(&mut a, &mut b);
-            if mask != 0 {
-                let mut d = take(&mut mask);
-                order(&mut c, &mut d);
-                order(&mut b, &mut c);
-                order(&mut a, &mut b);
-                self.push(d);
-            }
-            self.push(c);
-        }
+        let first = self.count;
         self.push(b);
+        while mask != 0 {
+            let mut c = take(&mut mask);
+            order(&mut a, &mut c);
+            self.push(c);
+            self.sink(first);
+        }
         Some(a.1)
+    }
+
+    /// Moves the last entry down to its place among those from `first` on, the farthest first.
+    #[inline(always)]
+    fn sink(&mut self, first: usize) {
+        let mut at = self.count - 1;
+        // What did not fit stays where it is: the order costs time at most.
+        while at > first && at < STACK && self.first[at - 1].0 < self.first[at].0 {
+            self.first.swap(at - 1, at);
+            at -= 1;
+        }
     }
 }
 

@@ -44,7 +44,7 @@ fn meets(b: &Aabb, origin: Vec3, direction: Vec3, limit: f64) -> bool {
 fn trees_keep_what_they_promise() {
     for count in [0, 1, 3, 4, 5, 11, 100, 30_000] {
         let boxes = boxes(count, 1);
-        let (tree, leaves) = Bvh4::build(count, |i| boxes[i as usize]);
+        let (tree, leaves) = WideBvh::build(count, |i| boxes[i as usize]);
         tree.check(&leaves, count, |i| boxes[i as usize])
             .unwrap_or_else(|fault| panic!("{count} items: {fault:?}"));
     }
@@ -56,7 +56,7 @@ fn equal_boxes_are_shared_out() {
         lo: [0.25; 3],
         hi: [0.5; 3],
     };
-    let (tree, leaves) = Bvh4::build(1000, |_| same);
+    let (tree, leaves) = WideBvh::build(1000, |_| same);
     assert!(tree.check(&leaves, 1000, |_| same).is_ok());
     assert!(leaves.len() < 400, "{} leaves", leaves.len());
 }
@@ -67,7 +67,7 @@ fn the_tree_ignores_threads() {
     let on = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
         pool.expect("threads can be started")
-            .install(|| Bvh4::build(boxes.len() as u32, |i| boxes[i as usize]))
+            .install(|| WideBvh::build(boxes.len() as u32, |i| boxes[i as usize]))
     };
     assert_eq!(on(1), on(3));
 }
@@ -75,7 +75,7 @@ fn the_tree_ignores_threads() {
 #[test]
 fn no_box_that_a_ray_meets_is_passed_by() {
     let boxes = boxes(3000, 3);
-    let (tree, leaves) = Bvh4::build(3000, |i| boxes[i as usize]);
+    let (tree, leaves) = WideBvh::build(3000, |i| boxes[i as usize]);
     let mut met = 0;
     for i in 0..2000 {
         let mut rng = Rng::new(4, i);
@@ -113,7 +113,7 @@ fn no_box_that_a_ray_meets_is_passed_by() {
 #[test]
 fn a_walk_breaks_off() {
     let boxes = boxes(1000, 5);
-    let (tree, _) = Bvh4::build(1000, |i| boxes[i as usize]);
+    let (tree, _) = WideBvh::build(1000, |i| boxes[i as usize]);
     let mut visits = 0;
     let ray = Slabs::new([-2.0; 3], [1.0; 3], 0.0);
     let end = tree.walk(&ray, 8.0, |_, _| {
