@@ -132,6 +132,14 @@ impl Source {
     /// A name that is absolute or leads out of the folder is refused, as is any name in an input
     /// that has no folder.
     pub fn companion(&self, name: &str) -> Result<Vec<u8>, Fault> {
+        let bytes = open_bytes(&self.beside(name)?, self.limit)
+            .map_err(|e| Fault::whole(format!("names the data file {name:?}: {e}")))?;
+        Ok(bytes.get().to_vec())
+    }
+
+    /// Where a file that this one names is, by the rules of [`Source::companion`]; it need not be
+    /// there.
+    pub fn beside(&self, name: &str) -> Result<PathBuf, Fault> {
         let relative = Path::new(name);
         if name.is_empty()
             || !relative
@@ -147,10 +155,7 @@ impl Source {
                 "names the data file {name:?}, but standard input has no folder"
             )));
         }
-        let path = self.path.parent().unwrap_or(Path::new("")).join(relative);
-        let bytes = open_bytes(&path, self.limit)
-            .map_err(|e| Fault::whole(format!("names the data file {name:?}: {e}")))?;
-        Ok(bytes.get().to_vec())
+        Ok(self.path.parent().unwrap_or(Path::new("")).join(relative))
     }
 }
 
