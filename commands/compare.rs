@@ -5,9 +5,10 @@ use crate::exit::Exit;
 use crate::job::{Found, Job};
 use crate::shared::{Common, InputFormat, Seed, not_negative};
 use crate::words;
-use scantle::error::Result;
+use scantle::error::{Result, number};
 use scantle::image::samples::Image;
 use scantle::io::Content;
+use scantle::io::format::Format;
 use scantle::measure::image_difference::{self, ImageDifference};
 use scantle::measure::mesh_distance::{self, MeshDifference};
 use scantle::measure::report_difference::{self, ReportDifference};
@@ -38,7 +39,7 @@ pub struct Args {
     #[command(flatten)]
     format: InputFormat,
     /// Exit with 1 when they differ by more than X: for meshes the Hausdorff distance in the file's
-    /// unit, for volumes the number of voxels that differ, for images the largest difference of a
+    /// unit, for volumes the number of voxels that differ, while another place of the grid fails, for images the largest difference of a
     /// channel in steps of eight bits (255 is full), for reports the largest relative difference of
     /// two numbers, |a - b| / max(|a|, |b|), while any other difference fails
     #[arg(long, value_name = "X", value_parser = not_negative)]
@@ -150,14 +151,18 @@ fn meshes(job: &mut Job, a: &Mesh, args: &Args) -> Compared {
     };
     let summary = format!(
         "hausdorff distance {} (at most {}), rms {}",
-        difference.hausdorff, difference.hausdorff_bound, difference.rms
+        number(difference.hausdorff),
+        number(difference.hausdorff_bound),
+        number(difference.rms)
     );
     let accuracy = Measures::One(difference.accuracy());
     Ok(Found::new(params, Stats::Mesh(Box::new(difference)), summary).accuracy(accuracy))
 }
 
 fn volumes(job: &mut Job, a: &Volume, args: &Args) -> Compared {
+    let a_is_placed = is_placed(job);
     let b = job.read_volume()?;
+    let both_placed = a_is_placed && is_placed(job);
     let params = volume_difference::Params::DEFAULT;
     let difference = volume_difference::compare(a, &b, &params, job.progress())?;
     job.warn(difference.warnings());
@@ -168,7 +173,20 @@ fn volumes(job: &mut Job, a: &Volume, args: &Args) -> Compared {
     let (differing, voxels) = (difference.differing, difference.voxels);
     let summary = format!("{differing} of {voxels} voxels differ");
     let accuracy = Measures::One(difference.accuracy());
-    Ok(Found::new(params, Stats::Volume(Box::new(difference)), summary).accuracy(accuracy))
+    let beyond = difference.beyond_measure().filter(|_| both_placed);
+    Ok(
+        Found::new(params, Stats::Volume(Box::new(difference)), summary)
+            .accuracy(accuracy)
+            .beyond_measure(beyond),
+    )
+}
+
+/// Whether the volume read last says where it is.
+fn is_placed(job: &Job) -> bool {
+    let format = job
+        .input()
+        .and_then(|input| Format::from_name(&input.format));
+    format.is_none_or(Format::holds_place)
 }
 
 fn images(job: &mut Job, a: &Image, args: &Args) -> Compared {
@@ -177,7 +195,10 @@ fn images(job: &mut Job, a: &Image, args: &Args) -> Compared {
     let difference = image_difference::compare(a, &b, job.progress())?;
     let params = args.for_any_kind();
     let (differing, pixels, max) = (difference.differing, difference.pixels, difference.max);
-    let summary = format!("{differing} of {pixels} pixels differ, by at most {max} of 255");
+    let summary = format!(
+        "{differing} of {pixels} pixels differ, by at most {} of 255",
+        number(max)
+    );
     let accuracy = Measures::One(difference.accuracy());
     Ok(Found::new(params, Stats::Image(Box::new(difference)), summary).accuracy(accuracy))
 }

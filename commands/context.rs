@@ -1,6 +1,6 @@
 //! What a command works in: threads, memory, and the reports of its jobs.
 
-use crate::destination::{self, Destination};
+use crate::destination::{self, Destination, Reads, Target, Writes};
 use crate::exit::Exit;
 use crate::job::{Found, Job};
 use crate::machine::{self, Moment};
@@ -78,7 +78,7 @@ impl<'a> Files<'a> {
         self.jobs().iter().map(|job| job[0].clone()).collect()
     }
 
-    fn plan_outputs(&self) -> Result<Option<Vec<(Destination, Format)>>> {
+    fn plan_outputs(&self) -> Result<Option<Vec<Target>>> {
         let Some((word, asked)) = self
             .output
             .and_then(|o| Some((o.output.as_deref()?, o.output_format)))
@@ -90,7 +90,11 @@ impl<'a> Files<'a> {
             .into_iter()
             .map(|place| {
                 let format = output_format(word, asked, &place.sink)?;
-                Ok((place, format))
+                Ok(Target {
+                    place,
+                    format,
+                    is_named: asked.is_some(),
+                })
             })
             .collect::<Result<_>>()
             .map(Some)
@@ -104,9 +108,26 @@ impl<'a> Files<'a> {
                 "-",
                 "a picture goes to a file, not to standard output",
             )),
-            Some(word) => destination::plan("preview", word, Some("png"), &self.names()).map(Some),
+            Some(word) => {
+                let planned = destination::plan("preview", word, Some("png"), &self.names())?;
+                planned
+                    .iter()
+                    .try_for_each(|place| check_preview(word, &place.sink))?;
+                Ok(Some(planned))
+            }
         }
     }
+}
+
+/// Errs where the name of a picture asks for another format than it has. A device may have no
+/// extension.
+fn check_preview(word: &str, sink: &Sink) -> Result<()> {
+    let extension = sink.path().extension();
+    if extension.is_none_or(|e| e.eq_ignore_ascii_case("png")) {
+        return Ok(());
+    }
+    let problem = "a preview is a PNG picture, and its name must end in .png";
+    Err(Error::parameter("preview", word, problem))
 }
 
 /// The format to write: as asked, or as the name tells.
@@ -173,12 +194,19 @@ impl<'a> Context<'a> {
         let outputs = files.plan_outputs()?;
         let previews = files.plan_previews()?;
         let report = self.report_sink(outputs.as_deref())?;
-        refuse_conflicts(files, outputs.as_deref(), previews.as_deref(), &report)?;
-        let results = outputs.iter().flatten().map(|(place, _)| place);
+        let memory = self.memory;
+        refuse_conflicts(
+            files,
+            memory,
+            outputs.as_deref(),
+            previews.as_deref(),
+            &report,
+        )?;
+        let results = outputs.iter().flatten().map(|target| &target.place);
         results
             .chain(previews.iter().flatten())
             .try_for_each(Destination::check)?;
-        report.iter().try_for_each(destination::check_folder)?;
+        report.iter().try_for_each(destination::check_place)?;
 
         let with_bar = !self.common.talk.quiet && progress::is_watched();
         let start = Cell::new(self.start);
@@ -214,9 +242,9 @@ impl<'a> Context<'a> {
     }
 
     /// Where reports go: standard output carries the result or the report, never both.
-    fn report_sink(&self, outputs: Option<&[(Destination, Format)]>) -> Result<Option<Sink>> {
+    fn report_sink(&self, outputs: Option<&[Target]>) -> Result<Option<Sink>> {
         let data_on_stdout =
-            outputs.is_some_and(|all| all.iter().any(|(place, _)| place.sink == Sink::Stdout));
+            outputs.is_some_and(|all| all.iter().any(|to| to.place.sink == Sink::Stdout));
         match (self.common.report.report.as_deref(), data_on_stdout) {
             (Some("-"), true) => Err(Error::parameter(
                 "report",
@@ -239,7 +267,8 @@ fn ending<T>(result: Result<T>) -> Exit {
 
 fn refuse_conflicts(
     files: &Files,
-    outputs: Option<&[(Destination, Format)]>,
+    memory: u64,
+    outputs: Option<&[Target]>,
     previews: Option<&[Destination]>,
     report: &Option<Sink>,
 ) -> Result<()> {
@@ -249,10 +278,20 @@ fn refuse_conflicts(
     }
     let outputs = outputs.into_iter().flatten();
     let previews = previews.into_iter().flatten();
+    let place = |option, sink, format| Writes {
+        option,
+        sink,
+        format,
+    };
     let written: Vec<_> = outputs
-        .map(|(place, _)| ("output", &place.sink))
-        .chain(previews.map(|place| ("preview", &place.sink)))
-        .chain(report.iter().map(|sink| ("report", sink)))
+        .map(|to| place("output", &to.place.sink, Some(to.format)))
+        .chain(previews.map(|to| place("preview", &to.sink, None)))
+        .chain(report.iter().map(|sink| place("report", sink, None)))
         .collect();
-    destination::refuse_overlap(files.inputs, &written)
+    let reads = Reads {
+        words: files.inputs,
+        format: files.format,
+        memory,
+    };
+    destination::refuse_overlap(&reads, &written)
 }

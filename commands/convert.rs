@@ -11,9 +11,9 @@ use scantle::io::format::{Format, Kind};
 use schemars::JsonSchema;
 use serde::Serialize;
 
-/// Write a mesh or a volume in another format
+/// Write a mesh, a volume or an image in another format
 ///
-/// Vertices, faces, voxels and their order stay as they are. What the output format cannot hold is
+/// Vertices, faces, voxels, pixels and their order stay as they are. What the output format cannot hold is
 /// left out, and a warning counts it.
 #[derive(Debug, clap::Args)]
 #[command(after_long_help = EXAMPLES)]

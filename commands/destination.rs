@@ -1,11 +1,14 @@
 //! Where results go: `-o` and `--preview` made into one file per input.
 
 use scantle::error::{Error, Result};
+use scantle::io;
+use scantle::io::format::Format;
 use scantle::io::sink::Sink;
+use scantle::io::source::Source;
 use std::collections::BTreeMap;
 use std::fs;
-use std::io;
-use std::path::{Path, PathBuf};
+use std::io::{Error as IoError, ErrorKind};
+use std::path::{Component, Path, PathBuf};
 
 /// Where the result of one input goes.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -16,6 +19,29 @@ pub struct Destination {
     makes_folder: bool,
 }
 
+/// Where and as what the result of one input is written.
+#[derive(Debug, Clone)]
+pub struct Target {
+    /// Where.
+    pub place: Destination,
+    /// In which format.
+    pub format: Format,
+    /// Whether the user named the format; else the name of the file tells it.
+    pub is_named: bool,
+}
+
+impl Target {
+    /// The error of a format that cannot be what is asked for, blamed on the option that said it.
+    pub fn wrong(&self, problem: impl Into<String>) -> Error {
+        if self.is_named {
+            Error::parameter("output-format", self.format.name(), problem)
+        } else {
+            let (path, problem) = (self.place.sink.path().display(), problem.into());
+            Error::parameter("output", path, format!("{} {problem}", self.format.name()))
+        }
+    }
+}
+
 impl Destination {
     /// Errs where the folder of the result is not there and will not be made: better said before
     /// the work than after it.
@@ -23,7 +49,7 @@ impl Destination {
         if self.makes_folder {
             return Ok(());
         }
-        check_folder(&self.sink)
+        check_place(&self.sink)
     }
 
     /// Makes the folder that the user named, if there is need.
@@ -40,15 +66,22 @@ impl Destination {
     }
 }
 
-/// Errs where the folder in which a file is to be written is not there.
-pub fn check_folder(sink: &Sink) -> Result<()> {
+/// Errs where the folder in which a file is to be written is not there, or a folder stands where
+/// the file is to be.
+pub fn check_place(sink: &Sink) -> Result<()> {
+    if *sink != Sink::Stdout && sink.path().is_dir() {
+        return Err(Error::Write {
+            path: sink.path().to_owned(),
+            source: IoError::new(ErrorKind::IsADirectory, "is a folder"),
+        });
+    }
     let folder = sink.path().parent().filter(|f| !f.as_os_str().is_empty());
     match folder {
         Some(folder) if !folder.is_dir() => {
             let problem = format!("there is no folder {}", folder.display());
             Err(Error::Write {
                 path: sink.path().to_owned(),
-                source: io::Error::new(io::ErrorKind::NotFound, problem),
+                source: IoError::new(ErrorKind::NotFound, problem),
             })
         }
         _ => Ok(()),
@@ -127,31 +160,133 @@ pub fn stem(input: &str) -> String {
         .map_or(String::new(), |stem| stem.display().to_string())
 }
 
-/// Refuses to write over an input, or twice to one place.
-pub fn refuse_overlap(inputs: &[String], outputs: &[(&'static str, &Sink)]) -> Result<()> {
-    let resolved = |path: &Path| fs::canonicalize(path).ok();
-    let read: Vec<_> = inputs
-        .iter()
-        .filter_map(|input| resolved(Path::new(input)))
-        .collect();
-    let mut written: Vec<(&str, PathBuf)> = Vec::new();
-    for (option, sink) in outputs {
-        let path = sink.path();
-        let target = match sink {
-            Sink::Stdout => path.to_owned(),
-            Sink::File(path) => resolved(path).unwrap_or_else(|| path.clone()),
+/// What a run reads: words of the command line, and how they are read.
+pub struct Reads<'a> {
+    /// The inputs.
+    pub words: &'a [String],
+    /// The format they are in, where the user says so.
+    pub format: Option<Format>,
+    /// Bytes that may be held.
+    pub memory: u64,
+}
+
+/// What a run writes.
+pub struct Writes<'a> {
+    /// The option that says where, without dashes.
+    pub option: &'static str,
+    /// Where.
+    pub sink: &'a Sink,
+    /// In which format, where that may mean a second file.
+    pub format: Option<Format>,
+}
+
+impl Writes<'_> {
+    /// The files that are replaced, each with what it is called beside the option.
+    fn files(&self) -> Vec<(&'static str, PathBuf)> {
+        let Sink::File(path) = self.sink else {
+            return Vec::new();
         };
-        if **sink != Sink::Stdout && read.contains(&target) {
-            let problem = "is an input, and inputs are never touched";
-            return Err(Error::parameter(option, path.display(), problem));
+        let beside = self.format.and_then(|f| io::written_beside(path, f));
+        let all = [("", Some(path.clone())), ("the data of ", beside)];
+        all.into_iter()
+            .filter_map(|(part, path)| Some((part, path?)))
+            // What is a pipe or a device holds nothing that could be lost.
+            .filter(|(_, path)| fs::metadata(path).map_or(true, |m| m.is_file() || m.is_dir()))
+            .collect()
+    }
+}
+
+/// Refuses to write over an input or the data beside one, or twice to one place.
+///
+/// Names are compared as the places they lead to, whether or not a file is there yet.
+pub fn refuse_overlap(reads: &Reads, outputs: &[Writes]) -> Result<()> {
+    let read: Vec<PathBuf> = reads
+        .words
+        .iter()
+        .filter_map(|input| fs::canonicalize(input).ok())
+        .collect();
+    // A file that is not there is data of no input; and looking costs a look into each input.
+    let mut files = outputs.iter().flat_map(Writes::files);
+    let data = if files.any(|(_, path)| path.exists()) {
+        reads.words.iter().flat_map(|w| data_of(w, reads)).collect()
+    } else {
+        Vec::new()
+    };
+    let mut written: Vec<(String, PathBuf)> = Vec::new();
+    let mut streamed: Option<&str> = None;
+    for output in outputs {
+        let shown = output.sink.path().display();
+        let refuse = |problem: String| Err(Error::parameter(output.option, &shown, problem));
+        if *output.sink == Sink::Stdout
+            && let Some(other) = streamed.replace(output.option)
+        {
+            return refuse(format!("is where --{other} goes already"));
         }
-        if let Some((other, _)) = written.iter().find(|(_, taken)| *taken == target) {
-            let problem = format!("is where --{other} goes already");
-            return Err(Error::parameter(option, path.display(), problem));
+        for (part, path) in output.files() {
+            let there = place_of(&path);
+            let it = if part.is_empty() {
+                String::new()
+            } else {
+                format!("its data goes to {}, which ", path.display())
+            };
+            if read.contains(&there) {
+                return refuse(format!("{it}is an input, and inputs are never touched"));
+            }
+            if let Some((_, input)) = data.iter().find(|(data, _)| *data == there) {
+                return refuse(format!(
+                    "{it}holds the data of {input}, and inputs are never touched"
+                ));
+            }
+            if let Some((other, _)) = written.iter().find(|(_, taken)| *taken == there) {
+                return refuse(format!("{it}is where {other} goes already"));
+            }
+            written.push((format!("{part}--{}", output.option), there));
         }
-        written.push((option, target));
     }
     Ok(())
+}
+
+/// The files beside an input that hold data of it, each with the input's name. What cannot be read
+/// has none, and neither has what can be read only once.
+fn data_of<'a>(input: &'a str, reads: &Reads) -> Vec<(PathBuf, &'a str)> {
+    if !Path::new(input).is_file() {
+        return Vec::new();
+    }
+    let Ok(source) = Source::open(input, reads.memory) else {
+        return Vec::new();
+    };
+    let beside = io::companions(&source, reads.format).into_iter();
+    beside
+        .filter_map(|path| Some((fs::canonicalize(path).ok()?, input)))
+        .collect()
+}
+
+/// Where a path leads to: links are followed, and of what is not there yet, the folders that are.
+fn place_of(path: &Path) -> PathBuf {
+    if let Ok(there) = fs::canonicalize(path) {
+        return there;
+    }
+    let folder = path.parent().filter(|f| !f.as_os_str().is_empty());
+    match path.file_name() {
+        Some(name) => place_of_folder(folder.unwrap_or(Path::new("."))).join(name),
+        None => path.to_owned(),
+    }
+}
+
+/// As [`place_of`], for a folder that may yet be made; `..` goes up from where it leads.
+fn place_of_folder(folder: &Path) -> PathBuf {
+    let here = Path::new(".");
+    let mut there = fs::canonicalize(here).unwrap_or(here.to_owned());
+    for part in folder.components() {
+        match part {
+            Component::ParentDir if !there.exists() => {
+                there.pop();
+            }
+            part => there.push(part),
+        }
+        there = fs::canonicalize(&there).unwrap_or(there);
+    }
+    there
 }
 
 #[cfg(test)]

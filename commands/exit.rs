@@ -20,10 +20,12 @@ pub enum Exit {
     NotWritten = 4,
     /// Refused: over a stated limit.
     OverLimit = 5,
+    /// A bug, always: a run inside this one panicked, or ended in a way that is no promise.
+    Bug = 101,
 }
 
 impl Exit {
-    /// The ending of a run that ended with this code; codes that are no promise are the worst.
+    /// The ending of a run that ended with this code; codes that are no promise are a bug.
     pub fn of_code(code: u8) -> Exit {
         match code {
             0 => Exit::Done,
@@ -31,7 +33,8 @@ impl Exit {
             2 => Exit::Usage,
             3 => Exit::BadInput,
             4 => Exit::NotWritten,
-            _ => Exit::OverLimit,
+            5 => Exit::OverLimit,
+            _ => Exit::Bug,
         }
     }
 
@@ -94,6 +97,17 @@ mod tests {
         for (error, code) in rows {
             assert_eq!(Exit::of(&error) as u8, code, "{error}");
         }
+    }
+
+    #[test]
+    fn a_crash_is_no_refusal() {
+        for code in 0..=5 {
+            assert_eq!(Exit::of_code(code) as u8, code);
+        }
+        for code in [6, 101, 134, 139, 255] {
+            assert_eq!(Exit::of_code(code), Exit::Bug, "{code}");
+        }
+        assert!(Exit::Bug > Exit::OverLimit);
     }
 
     #[test]

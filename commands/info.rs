@@ -15,7 +15,8 @@ use serde::Serialize;
 
 /// Tell what is in a file, and what looks wrong with it
 ///
-/// Counts, bounds and, of a mesh, its topology: whether it is closed, oriented and manifold. Of
+/// Counts, bounds and, of a mesh, its topology: whether it is closed, oriented and manifold. Of a
+/// volume, where it is, what is set and the range of values; of an image, its size and samples. Of
 /// JSON, the documents, and which commands they are reports of.
 #[derive(Debug, clap::Args)]
 #[command(after_long_help = EXAMPLES)]

@@ -1,13 +1,13 @@
 //! One job: what is read, made and written for one report.
 
 use crate::context::Context;
-use crate::destination::Destination;
+use crate::destination::{Destination, Target};
 use crate::exit::Exit;
 use crate::machine::{Moment, peak_bytes};
 use crate::progress::Recorder;
 use crate::streams::{complain, say};
 use crate::words;
-use scantle::error::{Error, Result};
+use scantle::error::{Error, Result, number};
 use scantle::image::samples::Image;
 use scantle::io::format::{Format, Kind};
 use scantle::io::sink::Sink;
@@ -99,6 +99,7 @@ impl<P, R> Found<P, R> {
         };
         // Written so that an error which is no number fails too.
         let holds = error <= most;
+        let [error, most] = [error, most].map(number);
         (!holds).then(|| format!("{measure} {verb} {error} {unit}, larger than --{option} {most}"))
     }
 }
@@ -108,8 +109,9 @@ pub struct Job<'a> {
     context: &'a Context<'a>,
     words: &'a [String],
     format: Option<Format>,
-    output: Option<(Destination, Format)>,
+    output: Option<Target>,
     preview: Option<Destination>,
+    unwritten: Vec<Error>,
     recorder: Recorder,
     read: Vec<Input>,
     written: Vec<Output>,
@@ -131,6 +133,7 @@ impl<'a> Job<'a> {
             format,
             output: None,
             preview: None,
+            unwritten: Vec::new(),
             recorder: Recorder::new(start, with_bar),
             read: Vec::new(),
             written: Vec::new(),
@@ -139,11 +142,7 @@ impl<'a> Job<'a> {
         }
     }
 
-    pub(crate) fn send_to(
-        &mut self,
-        output: Option<(Destination, Format)>,
-        preview: Option<Destination>,
-    ) {
+    pub(crate) fn send_to(&mut self, output: Option<Target>, preview: Option<Destination>) {
         self.output = output;
         self.preview = preview;
     }
@@ -155,17 +154,16 @@ impl<'a> Job<'a> {
 
     /// The format of the result, if one is to be written.
     pub fn output_format(&self) -> Option<Format> {
-        self.output.as_ref().map(|(_, format)| *format)
+        self.output.as_ref().map(|target| target.format)
     }
 
     /// Refuses, before any work, a result whose kind the output format cannot hold.
     pub fn expect_output(&self, kinds: &[Kind]) -> Result<()> {
-        match self.output_format() {
-            Some(format) if !kinds.contains(&format.kind()) => {
+        match &self.output {
+            Some(target) if !kinds.contains(&target.format.kind()) => {
                 let made: Vec<_> = kinds.iter().map(|kind| kind.with_article()).collect();
-                let (made, held) = (made.join(" or "), format.kind().with_article());
-                let problem = format!("holds {held}, but {made} is made here");
-                Err(Error::parameter("output-format", format.name(), problem))
+                let (made, held) = (made.join(" or "), target.format.kind().with_article());
+                Err(target.wrong(format!("holds {held}, but {made} is made here")))
             }
             _ => Ok(()),
         }
@@ -262,32 +260,43 @@ impl<'a> Job<'a> {
         &mut self,
         writer: impl FnOnce(&Sink, Format) -> Result<(Vec<Output>, Vec<Warning>)>,
     ) -> Result<()> {
-        let Some((place, format)) = &self.output else {
+        let Some(target) = &self.output else {
             return Ok(());
         };
         self.recorder.stage("write", 0);
-        place.prepare()?;
-        let (outputs, warnings) = writer(&place.sink, *format)?;
+        target.place.prepare()?;
+        let written = writer(&target.place.sink, target.format);
+        let (outputs, warnings) = written.map_err(|error| match error {
+            // The library knows the format, not what named it.
+            Error::Parameter {
+                option: "output-format",
+                problem,
+                ..
+            } => target.wrong(problem),
+            other => other,
+        })?;
         self.written.extend(outputs);
         self.warn(warnings);
         Ok(())
     }
 
     /// Draws and writes a picture (the bytes of a PNG file), if the user wants one.
-    pub fn write_preview(
-        &mut self,
-        draw: impl FnOnce(&dyn Progress) -> Result<Vec<u8>>,
-    ) -> Result<()> {
+    ///
+    /// Where that fails the job goes on: the result stands already, and its report is still due.
+    pub fn write_preview(&mut self, draw: impl FnOnce(&dyn Progress) -> Result<Vec<u8>>) {
         let Some(place) = &self.preview else {
-            return Ok(());
+            return;
         };
         self.recorder.stage("preview", 0);
-        let picture = draw(&self.recorder)?;
-        self.recorder.stage("write", 0);
-        place.prepare()?;
-        let output = place.sink.write_as("png", |out| out.write_all(&picture))?;
-        self.written.push(output);
-        Ok(())
+        let drawn = draw(&self.recorder).and_then(|picture| {
+            self.recorder.stage("write", 0);
+            place.prepare()?;
+            place.sink.write_as("png", |out| out.write_all(&picture))
+        });
+        match drawn {
+            Ok(output) => self.written.push(output),
+            Err(error) => self.unwritten.push(error),
+        }
     }
 
     /// Ends the job: says what is for people, and returns the report's bytes and the exit code.
@@ -302,6 +311,10 @@ impl<'a> Job<'a> {
         self.tell(&found.summary, &stages);
         if let Some(why) = &failure {
             say(format_args!("{}: check failed: {why}", self.words[0]));
+        }
+        let mut exit = failure.map_or(Exit::Done, |_| Exit::CheckFailed);
+        for error in std::mem::take(&mut self.unwritten) {
+            exit = exit.max(self.complain(error));
         }
         let run = self.context.common().timings.then(|| Run {
             wall_s: stages.iter().map(|stage| stage.wall_s).sum(),
@@ -324,13 +337,17 @@ impl<'a> Job<'a> {
             varies: Vec::new(),
             run,
         };
-        let exit = failure.map_or(Exit::Done, |_| Exit::CheckFailed);
         (words::json(&report, alone), exit)
     }
 
     /// Ends the job that failed: says why, with the file that it is about.
     pub(crate) fn fail(mut self, error: Error) -> Exit {
         self.recorder.finish();
+        self.complain(error)
+    }
+
+    /// Says what went wrong, with the file that it is about.
+    fn complain(&self, error: Error) -> Exit {
         let file = &self.words[self.opened.saturating_sub(1)];
         let error = match error {
             Error::Geometry(fault) => Error::Malformed {

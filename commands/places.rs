@@ -1,8 +1,10 @@
 //! Where the commands that run another one put what they found.
 
-use crate::destination::{check_folder, refuse_overlap};
+use crate::destination::{Reads, Writes, check_place, refuse_overlap};
+use crate::exit::Exit;
+use crate::machine::default_memory;
 use crate::shared::Wrapping;
-use crate::streams::print;
+use crate::streams::{complain, print};
 use crate::table::Table;
 use crate::words;
 use scantle::error::{Error, Result};
@@ -40,43 +42,59 @@ pub struct Places {
 
 impl Places {
     /// Errs, before any work, where two results would go to one place or over an input, or a folder
-    /// is not there.
+    /// is not there or stands in the way.
     pub fn new(wrapping: &Wrapping, inputs: &[String]) -> Result<Self> {
         let places = Places {
             csv: wrapping.csv.as_deref().map(Sink::new),
             plot: wrapping.plot.as_deref().map(Picture::new).transpose()?,
             report: Sink::new(wrapping.report.report.as_deref().unwrap_or("-")),
         };
-        let csv = places.csv.iter().map(|sink| ("csv", sink));
-        let plot = places.plot.iter().map(|plot| ("plot", &plot.sink));
-        let report = [("report", &places.report)];
+        let place = |option, sink| Writes {
+            option,
+            sink,
+            format: None,
+        };
+        let csv = places.csv.iter().map(|sink| place("csv", sink));
+        let plot = places.plot.iter().map(|plot| place("plot", &plot.sink));
+        let report = [place("report", &places.report)];
         let written: Vec<_> = plot.chain(csv).chain(report).collect();
-        refuse_overlap(inputs, &written)?;
+        let reads = Reads {
+            words: inputs,
+            format: None,
+            memory: default_memory(),
+        };
+        refuse_overlap(&reads, &written)?;
         written
             .iter()
-            .try_for_each(|(_, sink)| check_folder(sink))?;
+            .try_for_each(|place| check_place(place.sink))?;
         Ok(places)
     }
 
-    /// Writes the plot and the table, where they are wanted.
+    /// Writes the plot and the table, where they are wanted: what was written, and the exit code of
+    /// what could not be, which is said. The report is due all the same.
     pub fn write(
         &self,
         plot: impl FnOnce() -> Plot,
         table: impl FnOnce() -> Table,
-    ) -> Result<Vec<Output>> {
+    ) -> (Vec<Output>, Exit) {
         let mut written = Vec::new();
+        let mut exit = Exit::Done;
+        let mut keep = |result: Result<Output>| match result {
+            Ok(output) => written.push(output),
+            Err(error) => exit = exit.max(complain(&error, None)),
+        };
         if let Some(Picture { sink, name }) = &self.plot {
             let drawn = match *name {
                 "svg" => plot().svg().into_bytes(),
                 _ => plot().png(),
             };
-            written.push(sink.write_as(name, |out| out.write_all(&drawn))?);
+            keep(sink.write_as(name, |out| out.write_all(&drawn)));
         }
         if let Some(sink) = &self.csv {
             let text = table().csv();
-            written.push(sink.write_as("csv", |out| out.write_all(&text))?);
+            keep(sink.write_as("csv", |out| out.write_all(&text)));
         }
-        Ok(written)
+        (written, exit)
     }
 
     /// Writes the report; `varies` names what of it does from run to run.

@@ -98,7 +98,7 @@ fn in_a_fresh_process(words: &[String]) -> Result<Ended, Failed> {
             output.stderr,
         )),
         None => Err(Failed {
-            code: Exit::OverLimit as u8,
+            code: Exit::Bug as u8,
             message: format!("it was ended from outside: {}", output.status),
         }),
     }

@@ -141,10 +141,10 @@ pub fn run(args: &Args) -> Result<Exit> {
         show(&result::summary(&stats));
     }
     let exit = judge(&stats, args.max_error);
-    let output = places.write(|| result::plot(&stats), || result::exported(&stats))?;
+    let (output, unwritten) = places.write(|| result::plot(&stats), || result::exported(&stats));
     let asked = Asked::new(&wrapped, args);
     places.deliver("stability", asked, stats, vec![input], output, Vec::new())?;
-    Ok(exit)
+    Ok(exit.max(unwritten))
 }
 
 /// The check, where it was asked for.

@@ -109,14 +109,14 @@ pub fn run(args: &Args) -> Result<Exit> {
     if !talk.quiet {
         show(&result::shown(&stats).aligned());
     }
-    let output = places.write(
+    let (output, unwritten) = places.write(
         || result::plot(&stats, args.cost, &limits),
         || result::exported(&stats),
-    )?;
+    );
     let exit = judge(&stats, &rows, choice, &limits, talk.quiet);
     let varies = Stats::varies(&params);
     places.deliver("tradeoff", asked, stats, input, output, varies)?;
-    Ok(exit)
+    Ok(exit.max(unwritten))
 }
 
 /// Runs the grid: the rows, and the inputs as the first run that went well read them.

@@ -140,7 +140,16 @@ fn voxelize(job: &mut Job, params: &Params, args: &Args) -> Result<Found<Params,
     let verified = args
         .verify
         .verify
-        .then(|| voxel_error::measure(&mesh, &volume, params, &made.lattice(), job.progress()))
+        .then(|| {
+            voxel_error::measure(
+                &mesh,
+                &volume,
+                params,
+                &made.lattice(),
+                made.orientation(),
+                job.progress(),
+            )
+        })
         .transpose()?;
     let accuracy = match &verified {
         Some(error) => error.accuracy(made.bounds(), made.spacing[0]),
@@ -156,7 +165,7 @@ fn voxelize(job: &mut Job, params: &Params, args: &Args) -> Result<Found<Params,
         .input()
         .map(|input| stem(&input.path))
         .unwrap_or_default();
-    job.write_preview(|_| picture(&name, &mesh, &volume, &made, &accuracy[0]))?;
+    job.write_preview(|_| picture(&name, &mesh, &volume, &made, &accuracy[0]));
     let modelled = made.modelled();
     let found = Found::new(params.clone(), Stats { made, verified }, summary);
     Ok(found

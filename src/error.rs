@@ -88,6 +88,16 @@ impl fmt::Display for Fault {
     }
 }
 
+/// A number as messages say it: the shortest digits that read back, with an exponent where those
+/// would be many zeros.
+pub fn number(value: f64) -> String {
+    let text = format!("{value:?}");
+    match text.strip_suffix(".0") {
+        Some(whole) => whole.to_owned(),
+        None => text,
+    }
+}
+
 /// Everything this library refuses or fails at.
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
@@ -184,6 +194,21 @@ impl Error {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn numbers_are_short() {
+        let said = [0.0, 1.0, -2.5, 1e-300, 1e300, 0.1 + 0.2, f64::INFINITY].map(number);
+        let wanted = [
+            "0",
+            "1",
+            "-2.5",
+            "1e-300",
+            "1e300",
+            "0.30000000000000004",
+            "inf",
+        ];
+        assert_eq!(said, wanted);
+    }
 
     #[test]
     fn a_message_names_file_place_and_numbers() {

@@ -82,6 +82,95 @@ fn an_input_is_not_written_over_by_any_name() {
 }
 
 #[test]
+fn two_results_do_not_go_to_one_file_that_is_not_there_yet() {
+    let place = Workplace::new();
+    fs::create_dir(place.path("b")).unwrap();
+    symlink("b", place.path("link")).unwrap();
+    let cube = "fixtures/shapes/cube.obj";
+    for line in [
+        format!("convert {cube} -o ./b/n.ply --report b/n.ply"),
+        format!("convert {cube} -o link/n.ply --report b/n.ply"),
+        format!("convert {cube} -o new/ --output-format ply --report ./new/cube.ply"),
+        format!("voxelize {cube} -o b/y.png --output-format ply --preview b/../b/y.png"),
+        format!("voxelize {cube} -o b/z.mhd --report b/z.raw"),
+        format!("voxelize {cube} -o b/z.mhd --report link/../b/./z.raw"),
+        format!("tradeoff voxelize {cube} --vary resolution=4 --csv b/t --report ./b/t"),
+    ] {
+        let ran = place.run(&line);
+        assert_eq!(ran.code, 2, "{line}: {}", ran.stderr);
+        assert!(
+            ran.stderr.contains("goes already"),
+            "{line}: {}",
+            ran.stderr
+        );
+        assert_eq!(ran.stdout, b"", "{line}");
+    }
+    assert_eq!(fs::read_dir(place.path("b")).unwrap().count(), 0);
+    assert_eq!(place.names(), ["b", "link"]);
+}
+
+#[test]
+fn a_pipe_takes_two_results() {
+    let place = Workplace::new();
+    let line = "mkfifo p; exec 3<>p; \
+        scantle convert fixtures/shapes/cube.obj -o p --output-format ply --report p; \
+        head -c 4 <&3";
+    let ran = place.shell(line);
+    assert_eq!(
+        (ran.code, ran.stdout.as_slice()),
+        (0, b"ply\n".as_slice()),
+        "{}",
+        ran.stderr
+    );
+}
+
+#[test]
+fn data_beside_an_input_is_not_written_over() {
+    let place = Workplace::new();
+    let made = place.run("voxelize fixtures/shapes/cube.obj --resolution 5 -o b.mhd");
+    assert_eq!(made.code, 0, "{}", made.stderr);
+    fs::rename(place.path("b.mhd"), place.path("in.mhd")).unwrap();
+    place.put(
+        "in.nrrd",
+        "NRRD0004\ntype: uchar\ndimension: 3\nsizes: 7 7 7\nencoding: raw\ndata file: b.raw\n",
+    );
+    let gltf = r#"{"asset":{"version":"2.0"},"scenes":[{"nodes":[0]}],"nodes":[{"mesh":0}],
+        "meshes":[{"primitives":[{"attributes":{"POSITION":0}}]}],
+        "accessors":[{"bufferView":0,"componentType":5126,"count":3,"type":"VEC3"}],
+        "bufferViews":[{"buffer":0,"byteLength":36}],
+        "buffers":[{"byteLength":36,"uri":"./b%2Eraw"}]}"#;
+    place.put("in.gltf", gltf);
+    let data = fs::read(place.path("b.raw")).unwrap();
+    for line in [
+        "convert in.mhd -o b.mhd",
+        "convert in.mhd -o {stem}/../b.raw --output-format nrrd",
+        "convert in.nrrd -o ./b.mhd",
+        "info in.nrrd --report b.raw",
+        "info fixtures/shapes/cube.obj in.mhd --report b.raw",
+        "info in.gltf --report b.raw",
+        "voxelize in.gltf --resolution 4 -o b.mhd",
+        "tradeoff voxelize in.gltf --vary resolution=4 --csv b.raw",
+    ] {
+        fs::create_dir_all(place.path("in")).unwrap();
+        let ran = place.run(line);
+        assert_eq!(ran.code, 2, "{line}: {}", ran.stderr);
+        let why = "which holds the data of in.";
+        let why = if line.contains("b.mhd") {
+            why
+        } else {
+            &why[6..]
+        };
+        assert!(ran.stderr.contains(why), "{line}: {}", ran.stderr);
+        assert!(ran.stderr.contains("inputs are never touched"), "{line}");
+    }
+    assert_eq!(fs::read(place.path("b.raw")).unwrap(), data);
+    // A name of the same kind elsewhere is free.
+    let ran = place.run("convert in.mhd -o in/b.mhd");
+    assert_eq!(ran.code, 0, "{}", ran.stderr);
+    assert_eq!(fs::read(place.path("in/b.raw")).unwrap(), data);
+}
+
+#[test]
 fn a_pipe_is_written_to_and_stays_a_pipe() {
     let place = Workplace::new();
     let line = "mkfifo cube.ply; cat cube.ply > copy.ply & \

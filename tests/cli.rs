@@ -1,6 +1,6 @@
 //! What every command promises: exit codes, streams, options.
 
-use crate::support::{Workplace, packed, ran};
+use crate::support::{Workplace, packed, ran, root};
 use std::fs::{self, File};
 use std::io::Read;
 use std::os::unix::fs::PermissionsExt;
@@ -367,9 +367,26 @@ fn the_batch_system_limits_the_threads() {
 #[test]
 fn schemas_are_schemas() {
     let place = Workplace::new();
-    for command in ["", "compare", "convert", "formats", "info"] {
-        let schema = place.run(&format!("schema {command}")).document();
-        jsonschema::validator_for(&schema).expect("a schema");
+    // Each command has a page; these print no report.
+    let without = ["completions", "schema"];
+    let pages = fs::read_dir(root().join("man")).expect("the pages");
+    let pages = pages.filter_map(|page| page.expect("an entry").file_name().into_string().ok());
+    let mut commands: Vec<String> = pages
+        .filter_map(|page| {
+            Some(
+                page.strip_prefix("scantle-")?
+                    .strip_suffix(".1")?
+                    .to_owned(),
+            )
+        })
+        .filter(|command| !without.contains(&command.as_str()))
+        .collect();
+    assert!(commands.len() >= 8, "{commands:?}");
+    commands.push(String::new());
+    for command in commands {
+        let ran = place.run(&format!("schema {command}"));
+        assert_eq!(ran.code, 0, "{command} has no schema: {}", ran.stderr);
+        jsonschema::validator_for(&ran.document()).expect("a schema");
     }
     let formats = place.run("formats --json").document();
     let schema = place.run("schema formats").document();
@@ -377,4 +394,124 @@ fn schemas_are_schemas() {
     let report = place.run("info fixtures/shapes/cube.obj").document();
     let envelope = place.run("schema").document();
     assert!(jsonschema::is_valid(&envelope, &report));
+}
+
+#[test]
+fn a_preview_is_named_as_what_it_is() {
+    let place = Workplace::new();
+    let ran = place.run("voxelize fixtures/shapes/cube.obj --resolution 4 --preview a.jpg");
+    assert_eq!(ran.code, 2, "{}", ran.stderr);
+    let wanted =
+        "scantle: --preview a.jpg: a preview is a PNG picture, and its name must end in .png\n";
+    assert_eq!(ran.stderr, wanted);
+    assert!(place.names().is_empty());
+}
+
+#[test]
+fn a_picture_that_cannot_be_written_costs_no_report() {
+    let place = Workplace::new();
+    // No file may grow past two blocks of 1024 bytes: the volume fits, the picture does not.
+    let line = "trap '' XFSZ; ulimit -f 2; \
+        scantle voxelize fixtures/shapes/cube.obj --resolution 4 -o y.nrrd --preview y.png";
+    let ran = place.shell(line);
+    assert_eq!(ran.code, 4, "{}", ran.stderr);
+    assert!(
+        ran.stderr.contains("scantle: y.png: cannot write: "),
+        "{}",
+        ran.stderr
+    );
+    let report = ran.document();
+    assert_eq!(report["output"].as_array().map(Vec::len), Some(1));
+    assert_eq!(report["output"][0]["path"], "y.nrrd");
+    assert_eq!(place.names(), ["y.nrrd"]);
+}
+
+#[test]
+fn messages_blame_what_was_said_and_are_short() {
+    let place = Workplace::new();
+    place.put("empty", "");
+    place.put("cube.stl", fs::read(place.path(CUBE)).expect("the cube"));
+    for (line, code, said) in [
+        (
+            "convert fixtures/images/pattern.png -o x.ply",
+            2,
+            "--output x.ply: ply holds a mesh, but an image is made here",
+        ),
+        (
+            "convert fixtures/images/pattern.png -o x --output-format ply",
+            2,
+            "--output-format ply: holds a mesh, but an image is made here",
+        ),
+        (
+            "voxelize fixtures/shapes/torus.obj --resolution 4 -o x.binvox",
+            2,
+            "--output x.binvox: binvox holds cubes only, and the grid is 6 x 6 x 3; \
+             make one of 6 x 6 x 6, or choose another format",
+        ),
+        ("info empty", 3, "empty: the file is empty"),
+        ("info cube.stl", 3, "cube.stl: is text that begins with \""),
+        (
+            "voxelize fixtures/shapes/cube.obj --voxel-size 1e-300",
+            5,
+            "a grid with voxels of 1e-300 needs 9.999999999999999e299 voxels along x, over the limit of 65536 voxels",
+        ),
+    ] {
+        let ran = place.run(line);
+        assert_eq!(ran.code, code, "{line}: {}", ran.stderr);
+        assert!(ran.stderr.contains(said), "{line}: {}", ran.stderr);
+    }
+    let piped = place.run_with_input("info -", Vec::new());
+    assert_eq!(
+        (piped.code, piped.stderr.as_str()),
+        (3, "scantle: -: the file is empty\n")
+    );
+}
+
+#[test]
+fn grids_at_two_places_are_not_the_same_within_any_tolerance() {
+    let place = Workplace::new();
+    let text = |origin: &str, step: &str| {
+        format!(
+            "NRRD0004\ntype: uchar\ndimension: 3\nsizes: 2 2 2\nencoding: ascii\n\
+             space dimension: 3\nspace directions: ({step},0,0) (0,1,0) (0,0,1)\n\
+             space origin: ({origin},0,0)\n\n1 0 1 0 1 0 1 0\n"
+        )
+    };
+    place.put("a.nrrd", text("0", "1"));
+    place.put("moved.nrrd", text("0.25", "1"));
+    place.put("wider.nrrd", text("0", "1.5"));
+    place.put("same.nrrd", text("1e-9", "1"));
+    for (other, code) in [("moved", 1), ("wider", 1), ("same", 0)] {
+        let ran = place.run(&format!("compare a.nrrd {other}.nrrd --tolerance 100"));
+        assert_eq!(ran.code, code, "{other}: {}", ran.stderr);
+        let why = "check failed: the grids are not at the same place: ";
+        assert_eq!(ran.stderr.contains(why), code == 1, "{}", ran.stderr);
+        assert_eq!(place.run(&format!("compare a.nrrd {other}.nrrd")).code, 0);
+    }
+}
+
+#[test]
+fn a_table_that_cannot_be_written_costs_no_measurement() {
+    let place = Workplace::new();
+    // Reports and pictures of runs inside go elsewhere; no file may grow past a block here.
+    let line = "trap '' XFSZ; ulimit -f 1; scantle tradeoff voxelize fixtures/shapes/cube.obj \
+        --vary resolution=4,5 --repeat 1 --in-process --plot t.svg";
+    let ran = place.shell(line);
+    assert_eq!(ran.code, 4, "{}", ran.stderr);
+    assert!(
+        ran.stderr.contains("scantle: t.svg: cannot write: "),
+        "{}",
+        ran.stderr
+    );
+    let report = ran.document();
+    assert_eq!(
+        report["result"]["rows"].as_array().map_or(0, Vec::len),
+        2,
+        "{report}"
+    );
+    assert_eq!(report["output"].as_array().map(Vec::len), Some(0));
+    fs::create_dir(place.path("t.csv")).expect("a folder");
+    let line = "tradeoff voxelize fixtures/shapes/cube.obj --vary resolution=4 --csv t.csv";
+    let ran = place.run(line);
+    assert_eq!((ran.code, ran.stdout.len()), (4, 0), "{}", ran.stderr);
 }

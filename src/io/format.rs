@@ -257,6 +257,11 @@ impl Format {
         self.row().kind
     }
 
+    /// Whether its volumes have a place in space; those without are read as if at the origin.
+    pub fn holds_place(self) -> bool {
+        self != Format::Npy
+    }
+
     /// Whether it is read.
     pub fn is_read(self) -> bool {
         self.row().read

@@ -17,6 +17,7 @@ use flate2::read::ZlibDecoder;
 use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::io::{self, Write};
+use std::path::{Path, PathBuf};
 
 /// Reads a volume of one channel: raw, text or packed with zlib, local or in one file beside the
 /// header.
@@ -54,6 +55,18 @@ pub fn read(source: &Source, warnings: &mut Vec<Warning>) -> Result<Volume, Refu
         )
     };
     Ok(Volume { frame, data })
+}
+
+/// The name of the data file that a header gives, as it stands there; `None` for data of its own,
+/// and where the header is not sound.
+pub fn named_file(bytes: &[u8]) -> Option<String> {
+    let header = Header::parse(bytes).ok()?;
+    header.data_file().ok()?.map(str::to_owned)
+}
+
+/// Where [`write_pair`] puts the data of a header that goes to `path`.
+pub fn data_path(path: &Path) -> PathBuf {
+    path.with_extension("raw")
 }
 
 /// The tags of a header, in any order, up to `ElementDataFile`.
@@ -274,7 +287,7 @@ pub fn write_pair(volume: &Volume, sink: &Sink) -> Result<Vec<Output>> {
     if sink.is_gzip() {
         return refuse("an mhd header names its data file and is not packed; use mha");
     }
-    let beside = path.with_extension("raw");
+    let beside = data_path(path);
     let Some(name) = beside.file_name().and_then(|name| name.to_str()) else {
         return refuse("the name of the data file must be text that a header can hold");
     };

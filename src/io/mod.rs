@@ -44,6 +44,7 @@ use serde_json::Value;
 use sink::Sink;
 use source::Source;
 use std::io::Write;
+use std::path::{Path, PathBuf};
 
 /// What a file holds, as one of the kinds that scantle knows.
 #[derive(Debug, Clone, PartialEq)]
@@ -77,13 +78,13 @@ impl Content {
 /// [`Error::Limit`] where what it holds takes more memory than the source may use.
 pub fn read(source: &Source, format: Option<Format>) -> Result<(Content, Input, Vec<Warning>)> {
     let malformed = |fault| Refusal::Fault(fault).of(source);
+    if source.bytes().is_empty() {
+        return Err(malformed(Fault::whole("the file is empty")));
+    }
     let format = match format {
         Some(format) => format,
         None => format::sniff(source.bytes(), source.extension()).map_err(malformed)?,
     };
-    if source.bytes().is_empty() {
-        return Err(malformed(Fault::whole("the file is empty")));
-    }
     let mut warnings = Vec::new();
     let (content, digest) =
         rayon::join(|| parse(source, format, &mut warnings), || source.sha256());
@@ -134,6 +135,28 @@ fn parse(source: &Source, format: Format, warnings: &mut Vec<Warning>) -> Result
         Content::Report(_) => {}
     }
     Ok(content)
+}
+
+/// The files beside an input that reading it opens too: those its header names.
+///
+/// None where the header is not sound: then nothing is read. Cost: that of the header, which is
+/// all of a glTF document.
+pub fn companions(source: &Source, format: Option<Format>) -> Vec<PathBuf> {
+    let bytes = source.bytes();
+    let sniffed = || format::sniff(bytes, source.extension()).ok();
+    let names = match format.or_else(sniffed) {
+        Some(Format::Nrrd) => nrrd::named_file(bytes).into_iter().collect(),
+        Some(Format::Mhd | Format::Mha) => metaimage::named_file(bytes).into_iter().collect(),
+        Some(Format::Gltf | Format::Glb) => gltf::named_files(bytes),
+        _ => Vec::new(),
+    };
+    let paths = names.iter().filter_map(|name| source.beside(name).ok());
+    paths.collect()
+}
+
+/// The file that is written beside `path` when it is written in this format, if there is one.
+pub fn written_beside(path: &Path, format: Format) -> Option<PathBuf> {
+    (format == Format::Mhd).then(|| metaimage::data_path(path))
 }
 
 /// Reads a mesh; a file of another kind is an error.

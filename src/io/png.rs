@@ -13,11 +13,15 @@ use std::io::{self, Cursor, Write};
 /// The first bytes of every PNG file.
 pub(super) const MAGIC: &[u8] = b"\x89PNG\r\n\x1a\n";
 
+/// A byte of deflate stands for at most this many: 258 for two bits.
+const MOST_PACKED: u128 = 1032;
+
 /// Reads a PNG image; samples of 16 bits stay so.
 ///
 /// Palettes become colours, samples of less than 8 bits are widened to 8, and a transparent colour
 /// becomes a channel of opacity. Errors when the data is damaged or ends early, the image is an
-/// animation, or takes more than the source's limit.
+/// animation, has more pixels than the file's bytes can stand for, or takes more than the source's
+/// limit.
 pub fn read(source: &Source) -> Result<Image, Refusal> {
     let bytes = usize::try_from(source.limit()).unwrap_or(usize::MAX);
     let mut decoder = Decoder::new_with_limits(Cursor::new(source.bytes()), Limits { bytes });
@@ -34,6 +38,15 @@ pub fn read(source: &Source) -> Result<Image, Refusal> {
     if needed > isize::MAX as u128 {
         return Err(Fault::whole(format!(
             "an image of {width} x {height} pixels is larger than memory can be"
+        ))
+        .into());
+    }
+    let packed = source.bytes().len();
+    let unpacked =
+        u128::from(height) * (u128::from(width) * header.bits_per_pixel() as u128).div_ceil(8);
+    if unpacked > MOST_PACKED * packed as u128 {
+        return Err(Fault::whole(format!(
+            "an image of {width} x {height} pixels holds {unpacked} bytes, which the file's {packed} cannot stand for"
         ))
         .into());
     }
@@ -225,6 +238,47 @@ mod tests {
         let image = decoded(encoded(ColorType::Grayscale, BitDepth::One, None, &bits));
         let wanted = Samples::Eight(vec![0, 255, 255, 0]);
         assert_eq!(image.expect("a sound image").samples, wanted);
+    }
+
+    #[test]
+    fn a_header_that_claims_more_than_the_data_can_hold_is_refused() {
+        let claimed = |side: u32, data: &[u8]| {
+            let mut out = Vec::new();
+            let mut writer = Encoder::new(&mut out, side, side)
+                .write_header()
+                .expect("a vector takes all");
+            writer
+                .write_chunk(png::chunk::IDAT, data)
+                .expect("a vector takes all");
+            drop(writer);
+            let packed = out.len();
+            let problem = decoded(out).expect_err("a few bytes are no image");
+            (problem.problem, packed)
+        };
+        let (problem, packed) = claimed(60_000, &[0; 250]);
+        assert_eq!(
+            problem,
+            format!(
+                "an image of 60000 x 60000 pixels holds 3600000000 bytes, which the file's {packed} cannot stand for"
+            )
+        );
+        // What the bytes could stand for is looked into, and found damaged.
+        let (problem, _) = claimed(100, &[0; 250]);
+        assert!(problem.starts_with("the PNG data is damaged"), "{problem}");
+    }
+
+    #[test]
+    fn one_colour_packs_as_far_as_deflate_goes() {
+        let image = Image {
+            width: 4096,
+            height: 2048,
+            channels: 1,
+            samples: Samples::Eight(vec![9; 4096 * 2048]),
+        };
+        let mut bytes = Vec::new();
+        write(&image, &mut bytes).expect("a vector takes all");
+        assert!(bytes.len() < 4096 * 2048 / 600, "{}", bytes.len());
+        assert_eq!(decoded(bytes), Ok(image));
     }
 
     #[test]

@@ -132,24 +132,7 @@ impl Source {
     /// A name that is absolute or leads out of the folder is refused, as is any name in an input
     /// that has no folder.
     pub fn companion(&self, name: &str) -> Result<Vec<u8>, Refusal> {
-        let relative = Path::new(name);
-        if name.is_empty()
-            || !relative
-                .components()
-                .all(|c| matches!(c, Component::Normal(_) | Component::CurDir))
-        {
-            return Err(Fault::whole(format!(
-                "names the data file {name:?}, which is not in its own folder or below"
-            ))
-            .into());
-        }
-        if self.name == "-" {
-            return Err(Fault::whole(format!(
-                "names the data file {name:?}, but standard input has no folder"
-            ))
-            .into());
-        }
-        let path = self.path.parent().unwrap_or(Path::new("")).join(relative);
+        let path = self.beside(name)?;
         let what = || format!("the data file {name:?}");
         let limit = self.limit;
         match open_bytes(&path, limit) {
@@ -168,6 +151,28 @@ impl Source {
                 Err(Fault::whole(format!("names the data file {name:?}: {error}")).into())
             }
         }
+    }
+
+    /// Where a file that this one names is, by the rules of [`Source::companion`]; it need not be
+    /// there.
+    pub fn beside(&self, name: &str) -> Result<PathBuf, Fault> {
+        let relative = Path::new(name);
+        if name.is_empty()
+            || !relative
+                .components()
+                .all(|c| matches!(c, Component::Normal(_) | Component::CurDir))
+        {
+            return Err(Fault::whole(format!(
+                "names the data file {name:?}, which is not in its own folder or below"
+            ))
+            .into());
+        }
+        if self.name == "-" {
+            return Err(Fault::whole(format!(
+                "names the data file {name:?}, but standard input has no folder"
+            )));
+        }
+        Ok(self.path.parent().unwrap_or(Path::new("")).join(relative))
     }
 }
 

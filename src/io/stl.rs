@@ -35,10 +35,22 @@ const TASK: usize = 1 << 13;
 /// Linear in the bytes; binary files on all threads.
 pub fn read(source: &Source, warnings: &mut Vec<Warning>) -> Result<Mesh, Fault> {
     let bytes = source.bytes();
-    let positions = if is_binary(bytes) || !is_text(bytes) {
-        read_binary(bytes, warnings)?
-    } else {
+    let positions = if !is_binary(bytes) && is_text(bytes) {
         read_ascii(bytes, warnings)?
+    } else if !is_binary(bytes) && is_other_text(bytes) {
+        let start = bytes.trim_ascii_start();
+        let first = shown(
+            start
+                .split(|b| *b == b'\n')
+                .next()
+                .unwrap_or(start)
+                .trim_ascii_end(),
+        );
+        let problem =
+            format!("is text that begins with {first}, where ascii STL begins with \"solid\"");
+        return Err(Fault::whole(problem).with_hint("name its format with --input-format"));
+    } else {
+        read_binary(bytes, warnings)?
     };
     let count = positions.len() / 3;
     if count == 0 {
@@ -74,6 +86,13 @@ fn is_text(bytes: &[u8]) -> bool {
     start.len() >= 5
         && start[..5].eq_ignore_ascii_case(b"solid")
         && !start.iter().take(1024).any(|b| *b < b'\t')
+}
+
+/// Whether the header of a binary file would be text with more than one line: nobody's header.
+fn is_other_text(bytes: &[u8]) -> bool {
+    let start = &bytes[..bytes.len().min(START)];
+    let is_text = |b: &u8| matches!(b, b'\t' | b'\n' | b'\r' | b' '..=b'~');
+    start.contains(&b'\n') && start.iter().all(is_text)
 }
 
 fn read_binary(bytes: &[u8], warnings: &mut Vec<Warning>) -> Result<Vec<Vec3>, Fault> {
@@ -304,6 +323,17 @@ mod tests {
 
     fn soup(mesh: &Mesh) -> Vec<[Vec3; 3]> {
         (0..mesh.triangles.len()).map(|t| mesh.corners(t)).collect()
+    }
+
+    #[test]
+    fn text_of_another_kind_is_named_as_such() {
+        let obj = format!("# a cube\n{}", "v 0.0 0.0 0.0\n".repeat(20));
+        let source = Source::from_bytes("cube.stl", obj.into_bytes()).expect("no gzip layer");
+        let fault = read(&source, &mut Vec::new()).expect_err("no STL");
+        assert_eq!(
+            fault.problem,
+            "is text that begins with \"# a cube\", where ascii STL begins with \"solid\""
+        );
     }
 
     #[test]

@@ -113,8 +113,8 @@ pub struct MeshFigures {
     pub measured: Kind,
     /// Whether every edge has two triangles.
     pub closed: bool,
-    /// Area of the triangles.
-    pub area: f64,
+    /// Area of the triangles; null where it overflows.
+    pub area: Option<f64>,
     /// Volume enclosed; null unless every edge is used as often in one direction as in the other.
     pub volume: Option<f64>,
     /// Smallest and largest coordinates: `[[x, y, z], [x, y, z]]`.
@@ -220,7 +220,7 @@ fn summary(
         hausdorff_bound: a_to_b.directed.max_bound.max(b_to_a.directed.max_bound),
         mean: length((a_to_b.sum + b_to_a.sum) / count),
         rms: length(((a_to_b.squares + b_to_a.squares) / count).sqrt()),
-        area_difference: relative(a.area, b.area),
+        area_difference: a.area.zip(b.area).and_then(|(a, b)| relative(a, b)),
         volume_difference: a.volume.zip(b.volume).and_then(|(a, b)| relative(a, b)),
         a,
         b,

@@ -11,3 +11,4 @@ mod test_shapes;
 pub mod tradeoff;
 pub mod volume_difference;
 pub mod voxel_error;
+mod winding_number;

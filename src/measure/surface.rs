@@ -71,6 +71,17 @@ impl<'a> Elements<'a> {
         Ok(Elements { kind, corners })
     }
 
+    /// The elements of all kinds at once; distances are to whichever is nearest.
+    pub fn all_of(mesh: &Mesh) -> Elements<'static> {
+        let triangles = mesh.triangles.iter().copied();
+        let segments = mesh.segments.iter().map(|&[a, b]| [a, b, b]);
+        let points = mesh.points.iter().map(|&p| [p; 3]);
+        Elements {
+            kind: Kind::Triangles,
+            corners: triangles.chain(segments).chain(points).collect(),
+        }
+    }
+
     pub fn bounds(&self, mesh: &Mesh) -> Aabb {
         let of = |part: &[[u32; 3]]| {
             Aabb::around(part.iter().flatten().map(|v| &mesh.positions[*v as usize]))
@@ -161,6 +172,11 @@ impl Surface {
             })
             .collect();
         parts.concat()
+    }
+
+    /// Whether `holds` is true of an element whose box meets `query`; it is asked of some others too.
+    pub fn any_overlapping(&self, query: &Aabb, holds: impl FnMut(u32) -> bool) -> bool {
+        self.bvh.any_overlapping(query, holds)
     }
 
     /// The element that is nearest to all three points at once: the one for which the largest of

@@ -1,6 +1,6 @@
 //! In which voxels two volumes differ.
 
-use crate::error::{Error, Fault, Result};
+use crate::error::{Error, Fault, Result, number};
 use crate::numeric::vector::{Vec3, add, cross, dot, length, scale, sub};
 use crate::progress::Progress;
 use crate::report::{Accuracy, Warning};
@@ -129,14 +129,25 @@ pub struct Amounts {
 }
 
 impl VolumeDifference {
+    /// What the number of differing voxels does not tell: that the grids are not at the same place,
+    /// so that no voxel is where the other volume has it.
+    pub fn beyond_measure(&self) -> Option<String> {
+        let [origins, axes] = [self.origin_difference, self.axes_difference];
+        // Written so that a difference which is no number counts too.
+        let same = origins <= SAME_PLACE && axes <= SAME_PLACE;
+        let [origins, axes] = [origins, axes].map(number);
+        (!same).then(|| {
+            format!(
+                "the grids are not at the same place: origins differ by {origins} voxels, axes by {axes} voxels at the far end"
+            )
+        })
+    }
+
     /// What looks wrong, as warnings for a report.
     pub fn warnings(&self) -> Vec<Warning> {
         let mut warnings = Vec::new();
-        if self.origin_difference.max(self.axes_difference) > SAME_PLACE {
-            let message = format!(
-                "the grids are not at the same place: origins differ by {} voxels, axes by {} voxels at the far end; voxels are compared by index",
-                self.origin_difference, self.axes_difference
-            );
+        if let Some(why) = self.beyond_measure() {
+            let message = format!("{why}; voxels are compared by index");
             warnings.push(Warning::new("frames-differ", message, 1, None));
         }
         if let Some(undefined) = self.amounts.map(|a| a.undefined).filter(|n| *n > 0) {

@@ -1,12 +1,17 @@
 //! How far voxels are from the surface they stand for.
 //!
-//! Distances are measured by exact closest points, outsides by a flood fill, insides by winding
-//! number: none of it is the code that set the voxels.
+//! What is measured is the grid as it was made, by other code than set its voxels: distances by exact
+//! closest points, touch by the closed triangle-box test for each voxel alone, insides by solid
+//! angles, outsides by a flood fill. Three things are shared with
+//! the voxelizer and not judged here: the way from file to grid coordinates, the triangle-box test
+//! itself, and which way round a fill takes the triangles. The leaks (E4) of a grid take the inside
+//! from filling again, and those of a filled one its surface voxels too; the plain numbers of
+//! voxels of other modes come from voxelizing again.
 
 mod room;
 
 use super::surface::{Elements, Surface};
-use crate::error::Result;
+use crate::error::{Error, Fault, Result};
 use crate::mesh::Mesh;
 use crate::numeric::vector::{Vec3, add, cross, length, scale, sub};
 use crate::progress::Progress;
@@ -16,18 +21,25 @@ use crate::spatial::bvh::Bvh;
 use crate::spatial::local::LocalFrame;
 use crate::volume::bits::BitGrid;
 use crate::volume::octree::Octree;
-use crate::volume::voxelize::{self, Fill, Lattice, Mode, Storage, touches};
+use crate::volume::voxelize::{self, Fill, Lattice, Mode, Orientation, Storage, touches};
 use crate::volume::{Data, Volume};
 use rayon::prelude::*;
 use room::Room;
 use schemars::JsonSchema;
 use serde::Serialize;
 
+mod filled;
+
+use filled::{Inside, missed_inside};
+
 /// Distance between samples of the surface, in voxels.
 const SAMPLING: f64 = 1.0 / 8.0;
 /// A sample is up to this many voxels beside the surface, by the rounding of its coordinates in a
 /// grid of 2^16 voxels, and so is a distance of this size no distance.
 const SAMPLE_ROUNDING: f64 = 1e-10;
+/// The voxels on the surface of a ball within a voxel, and around one.
+const WITHIN: f64 = 0.5;
+const AROUND: f64 = 0.866_025_403_784_438_6;
 /// Primitives per task.
 const CHUNK: usize = 1024;
 
@@ -39,39 +51,50 @@ pub struct VoxelError {
     pub to_surface_max: f64,
     /// Mean of the same.
     pub to_surface_mean: f64,
-    /// Largest distance from a sample of the surface to the nearest set voxel (E2); null when none is
-    /// set.
+    /// Largest distance from a sample of the model to the nearest set voxel (E2): of its triangles,
+    /// segments and points, and of the inside of a filled one; null when no voxel is set or no sample
+    /// lies in the grid.
     pub from_surface_max: Option<f64>,
-    /// Samples of the surface: no triangle has a point farther than 1/8 voxel from one.
+    /// Samples of triangles, segments and points in the grid: none of these has a point farther than
+    /// 1/8 voxel from one.
     pub samples: u64,
+    /// Sampled voxels of a filled grid, of 65536 drawn evenly from all with seed 0, whose centre is
+    /// inside by its winding number; null without a fill.
+    pub inside_samples: Option<u64>,
+    /// Those of them that are not set: 0, or a bug; null without a fill.
+    pub inside_missed: Option<u64>,
     /// Triangles none of whose voxels is set (E3).
     pub missed_triangles: u64,
-    /// Their share of the surface's area.
-    pub missed_area: f64,
+    /// Their share of the surface's area; null for a model without triangles.
+    pub missed_area: Option<f64>,
     /// Voxels whose centre is inside but that a flood from outside reaches through faces (E4); null
     /// for a surface that is open or not all in the grid.
     pub leaks: Option<u64>,
-    /// Voxels that the surface sets by the rule used.
+    /// Set voxels; of a filled grid those that the surface sets again by the rule used.
     pub surface_voxels: u64,
     /// Voxels that three-axis voxelization sets.
     pub three_axis_voxels: u64,
     /// Voxels that conservative voxelization sets.
     pub conservative_voxels: u64,
-    /// Voxels that the rule used sets and conservative voxelization does not: 0, or a bug.
+    /// Set voxels that no part of the model touches and, of a filled one, whose centre is not inside.
     pub not_conservative: u64,
 }
 
-/// Measures what [`voxelize::voxelize`] made of `mesh` with `params`.
+/// Measures what [`voxelize::voxelize`] made of `mesh` with `params`, on the `lattice` and with the
+/// `orientation` that its figures name.
 ///
-/// Cost: a nearest-element search for every set voxel and, outside of them, for every sample of the
-/// surface, of which there are about 64 to a voxel face. Memory: three to five more grids, a copy of
-/// the mesh, and trees over its elements and over the runs of set voxels; [`crate::error::Error::Limit`] refuses
-/// what of it would go over `params.max_memory`.
+/// Errs as voxelizing does, for set voxels of a mesh without elements, and with
+/// [`crate::error::Error::Limit`] where it would go over `params.max_memory`. Cost: a nearest-element
+/// search for every set voxel and, outside of them, for every sample of the surface, of which there
+/// are about 64 to a voxel face; a winding number for every set voxel and sample of a filled grid.
+/// Memory: three to four more grids, a copy of the mesh, and trees over its elements and over the
+/// runs of set voxels.
 pub fn measure(
     mesh: &Mesh,
     made: &Volume,
     params: &voxelize::Params,
     lattice: &Lattice,
+    orientation: &Orientation,
     progress: &dyn Progress,
 ) -> Result<VoxelError> {
     let again = |mode: Mode, fill: Fill| {
@@ -94,18 +117,14 @@ pub fn measure(
         again(Mode::Conservative, Fill::None)?.0,
         again(Mode::ThreeAxis, Fill::None)?.0,
     );
-    let surface_only = match params.mode {
-        Mode::Conservative | Mode::None => None,
-        mode => Some(again(mode, Fill::None)?.0),
+    let surface_only = match (params.mode, params.fill) {
+        (Mode::None, _) | (_, Fill::None) => None,
+        (mode, _) => Some(again(mode, Fill::None)?.0),
     };
-    let by_rule = match params.mode {
-        Mode::None => None,
-        Mode::Conservative => Some(&conservative),
+    let by_rule = match (params.mode, params.fill) {
+        (Mode::None, _) => None,
+        (_, Fill::None) => Some(made),
         _ => surface_only.as_ref(),
-    };
-    let solid = match params.fill {
-        Fill::None => None,
-        fill => Some(again(Mode::None, fill)?.0),
     };
     let grid_mesh = Mesh {
         positions: mesh
@@ -118,11 +137,20 @@ pub fn measure(
         points: mesh.points.clone(),
         ..Mesh::default()
     };
-    let (to_surface_max, to_surface_mean) = to_surface(&grid_mesh, made, solid.as_ref())?;
-    let (from_surface_max, samples) = from_surface(&grid_mesh, made, lattice.dims, &room)?;
+    let inside = Inside::of(&grid_mesh, params.fill, orientation);
+    let there = to_surface(&grid_mesh, made, inside.as_ref())?;
+    let cells = Cells::of(made, &room)?;
+    let (mut from_surface_max, samples) = from_surface(&grid_mesh, &cells, lattice.dims);
+    let filled = inside.map(|inside| missed_inside(&grid_mesh, made, &cells, &inside));
+    if let Some(filled) = filled.as_ref().filter(|filled| filled.samples > 0) {
+        from_surface_max = match (from_surface_max, filled.farthest) {
+            (Some(a), Some(b)) => Some(a.max(b)),
+            (a, b) => a.or(b),
+        };
+    }
     let (missed_triangles, missed_area) = missed(&grid_mesh, made, lattice.dims);
     let inside_grid = {
-        let bounds = grid_mesh.bounds();
+        let bounds = grid_mesh.used_bounds();
         (0..3).all(|a| bounds.lo[a] > 0.0 && bounds.hi[a] < lattice.dims[a] as f64)
     };
     let leaks = if inside_grid && !mesh.triangles.is_empty() {
@@ -136,17 +164,19 @@ pub fn measure(
     };
     let surface_voxels = by_rule.map_or(0, Volume::count_set);
     Ok(VoxelError {
-        to_surface_max,
-        to_surface_mean,
+        to_surface_max: there.max,
+        to_surface_mean: there.mean,
         from_surface_max,
         samples,
+        inside_samples: filled.as_ref().map(|filled| filled.samples),
+        inside_missed: filled.as_ref().map(|filled| filled.missed),
         missed_triangles,
         missed_area,
         leaks,
         surface_voxels,
         three_axis_voxels: three_axis.count_set(),
         conservative_voxels: conservative.count_set(),
-        not_conservative: by_rule.map_or(0, |surface| outside_of(surface, &conservative)),
+        not_conservative: there.untouched,
     })
 }
 
@@ -164,6 +194,7 @@ impl VoxelError {
             accuracy.reached = reached;
             accuracy.verified = reached.is_some();
         }
+        let proven = bounds.first().is_some_and(|first| first.bound.is_some());
         let last = bounds.split_off(bounds.len().min(2));
         let closed = self.leaks.is_some();
         let conservative = bounds.get(1).is_some_and(|b| b.bound == Some(0.0));
@@ -182,7 +213,8 @@ impl VoxelError {
             });
         };
         let exact = "exact closed triangle-box test";
-        let missed = Some(self.missed_triangles);
+        // Of a model without triangles none can be missed.
+        let missed = self.missed_area.map(|_| self.missed_triangles);
         count(
             "triangles none of whose voxels is set",
             "triangle",
@@ -201,10 +233,23 @@ impl VoxelError {
         count(
             "voxels that the surface does not touch",
             "voxel",
-            Some(0.0),
+            proven.then_some(0.0),
             Some(self.not_conservative),
-            exact,
+            if self.inside_missed.is_some() {
+                "exact closed triangle-box test, and winding number inside"
+            } else {
+                exact
+            },
         );
+        if let Some(missed) = self.inside_missed {
+            count(
+                "sampled voxels inside that are not set",
+                "voxel",
+                proven.then_some(0.0),
+                Some(missed),
+                "winding number at 65536 voxels drawn with seed 0",
+            );
+        }
         bounds.extend(last);
         bounds
     }
@@ -229,61 +274,108 @@ fn centres(volume: &Volume, z: usize) -> Vec<Vec3> {
     found
 }
 
-/// E1: largest and mean distance from the centres of set voxels to the model.
-fn to_surface(mesh: &Mesh, made: &Volume, solid: Option<&Volume>) -> Result<(f64, f64)> {
-    if made.count_set() == 0 {
-        return Ok((0.0, 0.0));
-    }
-    let elements = Elements::of(mesh, "to verify")?;
-    let frame = LocalFrame::around(elements.bounds(mesh));
-    let surface = Surface::new(mesh, elements, &frame);
-    let [nx, ny, nz] = made.frame.dims;
-    let (mut largest, mut sum, mut count) = (0.0f64, 0.0, 0u64);
-    let mut filled = BitGrid::new([nx, ny, 1]);
-    for z in 0..nz {
-        let mut points = centres(made, z);
-        count += points.len() as u64;
-        if let Some(solid) = solid {
-            solid.read_bit_slices(z, &mut filled);
-            points.retain(|p| !filled.get(p[0] as usize, p[1] as usize, 0));
-        }
-        for hit in surface.nearest_of(&points, |p| frame.to_local(*p)) {
-            let distance = frame.length(hit.distance);
-            largest = largest.max(distance);
-            sum += distance;
-        }
-    }
-    Ok((largest, sum / count.max(1) as f64))
+/// E1, and the set voxels that are neither touched nor inside.
+#[derive(Default)]
+struct There {
+    max: f64,
+    mean: f64,
+    untouched: u64,
 }
 
-/// E2: largest distance from samples of the surface to the nearest set voxel, and their number.
+/// Distances from the centres of set voxels to the model.
+fn to_surface(mesh: &Mesh, made: &Volume, inside: Option<&Inside>) -> Result<There> {
+    if made.count_set() == 0 {
+        return Ok(There::default());
+    }
+    let elements = Elements::all_of(mesh);
+    if elements.corners.is_empty() {
+        let problem = "voxels are set, but the model has nothing that could set them";
+        return Err(Error::Geometry(Fault::whole(problem)));
+    }
+    let frame = LocalFrame::around(elements.bounds(mesh));
+    let surface = Surface::new(mesh, elements, &frame);
+    let touched = |p: Vec3| {
+        let local = [-WITHIN, WITHIN].map(|w| frame.to_local(p.map(|c| c + w)));
+        let at = p.map(|c| c.floor() as i32);
+        surface.any_overlapping(&Aabb::around(&local), |element| {
+            let corners = surface.indices[element as usize];
+            touches(&corners.map(|v| mesh.positions[v as usize]), at, 1)
+        })
+    };
+    let mut found = There::default();
+    let (mut sum, mut count) = (0.0, 0u64);
+    for z in 0..made.frame.dims[2] {
+        let points = centres(made, z);
+        count += points.len() as u64;
+        let hits = surface.nearest_of(&points, |p| frame.to_local(*p));
+        let judged: Vec<(f64, bool)> = points
+            .par_iter()
+            .zip(&hits)
+            .map(|(p, hit)| {
+                let distance = frame.length(hit.distance);
+                if inside.is_some_and(|inside| inside.holds(*p, true)) {
+                    return (0.0, false);
+                }
+                let near = distance <= WITHIN - SAMPLE_ROUNDING;
+                let far = distance > AROUND + SAMPLE_ROUNDING;
+                (distance, far || !near && !touched(*p))
+            })
+            .collect();
+        for (distance, untouched) in judged {
+            found.max = found.max.max(distance);
+            sum += distance;
+            found.untouched += u64::from(untouched);
+        }
+    }
+    found.mean = sum / count.max(1) as f64;
+    Ok(found)
+}
+
+/// The closed boxes of the set voxels, to be searched.
+struct Cells {
+    boxes: Vec<Aabb>,
+    bvh: Bvh,
+}
+
+impl Cells {
+    fn of(made: &Volume, room: &Room) -> Result<Self> {
+        let boxes = cells(made, room)?;
+        let bvh = Bvh::build(boxes.len() as u32, |i| boxes[i as usize]);
+        Ok(Cells { boxes, bvh })
+    }
+
+    /// The distance to the nearest set voxel; none where none is set.
+    fn distance(&self, p: Vec3) -> Option<f64> {
+        let to = |i: u32| self.boxes[i as usize].distance_squared(p);
+        let found = self.bvh.nearest(p, f64::INFINITY, to);
+        found.map(|nearest| nearest.distance_squared.sqrt())
+    }
+}
+
+/// E2: largest distance from samples of the elements to the nearest set voxel, and their number.
 ///
 /// Samples outside of the grid count for nothing: no voxel could be there.
-fn from_surface(
-    mesh: &Mesh,
-    made: &Volume,
-    dims: [usize; 3],
-    room: &Room,
-) -> Result<(Option<f64>, u64)> {
-    let cells = cells(made, room)?;
-    if cells.is_empty() {
-        return Ok((None, 0));
-    }
-    let bvh = Bvh::build(cells.len() as u32, |i| cells[i as usize]);
-    let count = mesh.triangles.len();
+fn from_surface(mesh: &Mesh, cells: &Cells, dims: [usize; 3]) -> (Option<f64>, u64) {
+    let (triangles, segments) = (mesh.triangles.len(), mesh.segments.len());
+    let count = triangles + segments + mesh.points.len();
+    let at = |v: u32| mesh.positions[v as usize];
     let of_chunk = |chunk: usize| {
         let (mut worst, mut samples) = (0.0f64, 0);
-        for t in chunk * CHUNK..((chunk + 1) * CHUNK).min(count) {
-            for_each_sample(mesh.corners(t), &mut |p| {
-                if (0..3).any(|a| p[a] < 0.0 || p[a] > dims[a] as f64) {
-                    return;
-                }
-                samples += 1;
-                // Looking only for what is nearer than needed settles most samples at the root.
-                let found =
-                    bvh.nearest(p, f64::INFINITY, |i| cells[i as usize].distance_squared(p));
-                worst = worst.max(found.map_or(0.0, |n| n.distance_squared.sqrt()));
-            });
+        let mut judge = |p: Vec3| {
+            if (0..3).any(|a| p[a] < 0.0 || p[a] > dims[a] as f64) {
+                return;
+            }
+            samples += 1;
+            worst = worst.max(cells.distance(p).unwrap_or(0.0));
+        };
+        for i in chunk * CHUNK..((chunk + 1) * CHUNK).min(count) {
+            if i < triangles {
+                for_each_sample(mesh.corners(i), &mut judge);
+            } else if i < triangles + segments {
+                for_each_sample_between(mesh.segments[i - triangles].map(at), &mut judge);
+            } else {
+                judge(at(mesh.points[i - triangles - segments]));
+            }
         }
         (worst, samples)
     };
@@ -292,8 +384,14 @@ fn from_surface(
         .map(of_chunk)
         .collect();
     let worst = parts.iter().fold(0.0f64, |m, p| m.max(p.0));
-    let worst = if worst <= SAMPLE_ROUNDING { 0.0 } else { worst };
-    Ok((Some(worst), parts.iter().map(|p| p.1).sum()))
+    let samples = parts.iter().map(|p| p.1).sum();
+    if samples == 0 || cells.boxes.is_empty() {
+        return (None, samples);
+    }
+    (
+        Some(if worst <= SAMPLE_ROUNDING { 0.0 } else { worst }),
+        samples,
+    )
 }
 
 /// The closed boxes of the set voxels, runs along x joined.
@@ -361,8 +459,17 @@ fn for_each_sample(corners: [Vec3; 3], f: &mut impl FnMut(Vec3)) {
     }
 }
 
+/// Points of a segment such that none is farther than [`SAMPLING`] from one of them.
+fn for_each_sample_between([a, b]: [Vec3; 2], f: &mut impl FnMut(Vec3)) {
+    let way = sub(b, a);
+    let steps = (length(way) / SAMPLING).ceil().clamp(1.0, 1e6) as u32;
+    for i in 0..=steps {
+        f(add(a, scale(way, f64::from(i) / f64::from(steps))));
+    }
+}
+
 /// E3: triangles none of whose voxels is set, and their share of the area.
-fn missed(mesh: &Mesh, made: &Volume, dims: [usize; 3]) -> (u64, f64) {
+fn missed(mesh: &Mesh, made: &Volume, dims: [usize; 3]) -> (u64, Option<f64>) {
     let held = Held::of(made);
     let count = mesh.triangles.len();
     let parts: Vec<(u64, f64, f64)> = (0..count.div_ceil(CHUNK))
@@ -384,7 +491,8 @@ fn missed(mesh: &Mesh, made: &Volume, dims: [usize; 3]) -> (u64, f64) {
     let (missed, area, all) = parts
         .iter()
         .fold((0, 0.0, 0.0), |s, p| (s.0 + p.0, s.1 + p.1, s.2 + p.2));
-    (missed, if all > 0.0 { area / all } else { 0.0 })
+    let share = if all > 0.0 { area / all } else { 0.0 };
+    (missed, (count > 0).then_some(share))
 }
 
 /// Whether one of the voxels that a triangle touches is set; true for one outside of the grid.
@@ -439,24 +547,6 @@ impl<'a> Held<'a> {
             Held::Neither => false,
         }
     }
-}
-
-/// Number of voxels set in `a` and not in `b`.
-fn outside_of(a: &Volume, b: &Volume) -> u64 {
-    let [nx, ny, nz] = a.frame.dims;
-    let (mut of_a, mut of_b) = (BitGrid::new([nx, ny, 1]), BitGrid::new([nx, ny, 1]));
-    let mut count = 0;
-    for z in 0..nz {
-        a.read_bit_slices(z, &mut of_a);
-        b.read_bit_slices(z, &mut of_b);
-        count += of_a
-            .words()
-            .iter()
-            .zip(of_b.words())
-            .map(|(a, b)| u64::from((a & !b).count_ones()))
-            .sum::<u64>();
-    }
-    count
 }
 
 /// E4: voxels of `inside` that a flood from outside reaches through faces of voxels that are not set

@@ -86,12 +86,42 @@ impl Mesh {
         self.triangles[t].map(|v| self.positions[v as usize])
     }
 
-    /// The box around all vertices.
+    /// The box around all vertices, as a file holds them; see [`Mesh::used_bounds`].
     pub fn bounds(&self) -> Aabb {
         self.positions
             .par_chunks(1 << 14)
             .map(Aabb::around)
             .reduce(|| Aabb::EMPTY, Aabb::union)
+    }
+
+    /// The box around the model: the vertices that triangles, segments and points use.
+    ///
+    /// Vertices that nothing refers to are kept and written, but are no part of the model. Cost: one
+    /// pass over the elements.
+    pub fn used_bounds(&self) -> Aabb {
+        fn around<const N: usize>(positions: &[Vec3], elements: &[[u32; N]]) -> Aabb {
+            let of = |part: &[[u32; N]]| {
+                Aabb::around(part.iter().flatten().map(|v| &positions[*v as usize]))
+            };
+            elements
+                .par_chunks(1 << 14)
+                .map(of)
+                .reduce(|| Aabb::EMPTY, Aabb::union)
+        }
+        around(&self.positions, &self.triangles)
+            .union(around(&self.positions, &self.segments))
+            .union(around(&self.positions, self.points.as_chunks::<1>().0))
+    }
+
+    /// For each vertex, whether a triangle, segment or point uses it.
+    pub fn used_vertices(&self) -> Vec<bool> {
+        let mut used = vec![false; self.positions.len()];
+        let of_triangles = self.triangles.iter().flatten();
+        let of_segments = self.segments.iter().flatten();
+        for v in of_triangles.chain(of_segments).chain(&self.points) {
+            used[*v as usize] = true;
+        }
+        used
     }
 
     /// Whether nothing in it has a place: no triangle, segment or point.

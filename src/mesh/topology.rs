@@ -98,13 +98,18 @@ pub struct Topology {
     pub manifold: bool,
     /// Handles of the surface; null unless it is one closed, oriented manifold.
     pub genus: Option<i64>,
-    /// Area of the triangles, in the square of the file's unit.
-    pub area: f64,
+    /// Area of the triangles, in the square of the file's unit; null where it overflows.
+    pub area: Option<f64>,
     /// Volume enclosed, in the cube of the file's unit; negative where the triangles face inwards,
-    /// null unless every edge is used as often in one direction as in the other.
+    /// null unless every edge is used as often in one direction as in the other, and where it
+    /// overflows.
     pub volume: Option<f64>,
-    /// Smallest and largest coordinates: `[[x, y, z], [x, y, z]]`, null without vertices.
+    /// Smallest and largest coordinates of what triangles, segments and points use:
+    /// `[[x, y, z], [x, y, z]]`, null where there is none. Isolated vertices are no part of the model.
     pub bounds: Option<[[f64; 3]; 2]>,
+    /// Which of area and volume are larger than a double can be.
+    #[serde(skip)]
+    overflows: [bool; 2],
 }
 
 impl Topology {
@@ -147,10 +152,23 @@ impl Topology {
                 self.isolated_vertices,
             ),
         ];
+        let figures = [
+            ("area-overflows", "the area is larger than a number can be"),
+            (
+                "volume-overflows",
+                "the volume is larger than a number can be",
+            ),
+        ];
+        let overflows = figures.into_iter().zip(self.overflows);
         kinds
             .into_iter()
             .filter(|(_, _, found)| found.count > 0)
             .map(|(code, what, found)| Warning::new(code, what, found.count, found.first))
+            .chain(
+                overflows
+                    .filter(|(_, overflows)| *overflows)
+                    .map(|((code, what), _)| Warning::new(code, what, 1, None)),
+            )
             .collect()
     }
 }
@@ -191,11 +209,12 @@ pub fn topology(mesh: &Mesh, progress: &dyn Progress) -> Result<Topology> {
         || count_components(mesh, &same),
     );
     progress.stage("measure", 0);
-    let bounds = mesh.bounds();
+    let bounds = mesh.used_bounds();
     let (area, enclosed) = area_and_volume(mesh);
     let proper = corners.len() as u64 - degenerate_triangles.count;
     let euler_characteristic = fans.vertices as i64 - edges.count as i64 + proper as i64;
     let manifold = proper > 0 && edges.non_manifold.count == 0 && fans.non_manifold.count == 0;
+    let is_solid = proper > 0 && edges.balanced;
     let closed = proper > 0 && edges.non_manifold.count == 0 && edges.boundary.count == 0;
     let oriented = proper > 0 && edges.inconsistent.count == 0;
     let one = manifold && closed && oriented && components == 1;
@@ -218,9 +237,10 @@ pub fn topology(mesh: &Mesh, progress: &dyn Progress) -> Result<Topology> {
         oriented,
         manifold,
         genus: one.then_some(1 - euler_characteristic / 2),
-        area,
-        volume: (proper > 0 && edges.balanced).then_some(enclosed),
+        area: Some(area).filter(|area| area.is_finite()),
+        volume: is_solid.then_some(enclosed).filter(|v| v.is_finite()),
         bounds: (!bounds.is_empty()).then_some([bounds.lo, bounds.hi]),
+        overflows: [!area.is_finite(), is_solid && !enclosed.is_finite()],
     })
 }
 
@@ -411,19 +431,14 @@ fn count_components(mesh: &Mesh, same: &[u32]) -> u64 {
 }
 
 fn isolated(mesh: &Mesh) -> Found {
-    let mut used = vec![false; mesh.positions.len()];
-    let referred = mesh.triangles.iter().flatten();
-    let referred = referred.chain(mesh.segments.iter().flatten());
-    for v in referred.chain(&mesh.points) {
-        used[*v as usize] = true;
-    }
+    let used = mesh.used_vertices();
     Found::among(used.len(), |v| !used[v])
 }
 
 /// Triangles of three distinct corners on a line: those whose projections along all three axes
 /// have no area.
 fn collinear(mesh: &Mesh, corners: &[[u32; 3]]) -> Found {
-    let largest = mesh.bounds();
+    let largest = mesh.used_bounds();
     let size = (0..3)
         .map(|a| largest.lo[a].abs().max(largest.hi[a].abs()))
         .fold(0.0, f64::max);
@@ -464,7 +479,7 @@ fn duplicates(corners: &[[u32; 3]]) -> Found {
 
 /// Area and signed volume, summed in a frame near the mesh.
 fn area_and_volume(mesh: &Mesh) -> (f64, f64) {
-    let frame = LocalFrame::around(mesh.bounds());
+    let frame = LocalFrame::around(mesh.used_bounds());
     let local = |t: &[u32; 3]| t.map(|v| frame.to_local(mesh.positions[v as usize]));
     let twice = sum_by(&mesh.triangles, |t| {
         let [a, b, c] = local(t);

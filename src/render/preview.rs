@@ -184,12 +184,12 @@ impl<'a> Drawn<'a> {
 fn common_view(drawn: &[Drawn], column: usize, up: Up) -> (Camera, usize) {
     let bounds = drawn
         .iter()
-        .map(|d| d.mesh.bounds())
+        .map(|d| d.mesh.used_bounds())
         .fold(Aabb::EMPTY, Aabb::union);
     let camera = Camera::framing(&bounds, up.viewer(), up.direction(), 1.0);
     let seen = drawn
         .iter()
-        .map(|d| camera.seen(&d.mesh.positions))
+        .map(|d| camera.seen(&shown_vertices(&d.mesh)))
         .fold(Aabb::EMPTY, Aabb::union);
     let [wide, high, _] = seen.extent();
     let shape = if wide > 0.0 { high / wide } else { 1.0 };
@@ -199,6 +199,16 @@ fn common_view(drawn: &[Drawn], column: usize, up: Up) -> (Camera, usize) {
         height: rows.clamp(32, 480),
     };
     (camera.fitted(seen, size.aspect()), size.height)
+}
+
+/// The vertices that something drawn uses: others do not widen the view.
+fn shown_vertices(mesh: &Mesh) -> Cow<'_, [Vec3]> {
+    let used = mesh.used_vertices();
+    if used.iter().all(|used| *used) {
+        return Cow::Borrowed(&mesh.positions);
+    }
+    let all = mesh.positions.iter().zip(used);
+    all.filter_map(|(p, used)| used.then_some(*p)).collect()
 }
 
 /// Draws a scale bar into the lower right corner and returns the width it takes.

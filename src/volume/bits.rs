@@ -1,7 +1,7 @@
 //! The dense grid of bits.
 
 use rayon::prelude::*;
-use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::atomic::AtomicU64;
 
 /// A grid of bits: each row along x fills whole 64-bit words, bit `x % 64` of word `x / 64`; rows
 /// follow each other along y, then z. Bits past the end of a row are 0.
@@ -123,15 +123,6 @@ pub fn set_run(row: &mut [u64], x0: usize, x1: usize) {
         row[first] |= low;
         row[first + 1..last].fill(u64::MAX);
         row[last] |= high;
-    }
-}
-
-/// Sets the bits of `mask` in a word that other threads may be setting bits in too.
-#[inline]
-pub fn set_atomic(word: &AtomicU64, mask: u64) {
-    // Most voxels are met by several triangles: looking first is far cheaper than a locked write.
-    if word.load(Ordering::Relaxed) & mask != mask {
-        word.fetch_or(mask, Ordering::Relaxed);
     }
 }
 

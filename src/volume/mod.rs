@@ -187,7 +187,8 @@ impl Volume {
     /// Calls `f(z, row)` for each slice z from 0 up, with its samples as numbers, x fastest.
     ///
     /// One slice is held at a time, so a sparse volume is never expanded whole.
-    pub fn for_each_slice<E>(
+    #[cfg(test)]
+    fn for_each_slice<E>(
         &self,
         mut f: impl FnMut(usize, &[f64]) -> Result<(), E>,
     ) -> Result<(), E> {

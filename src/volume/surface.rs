@@ -28,7 +28,8 @@ const SIDES: [([isize; 3], [[usize; 3]; 4]); 6] = [
 ///
 /// Numbers other than 0 count as set. A sparse volume is read a few slices at a time. Cost: a few
 /// operations per 64 voxels.
-pub fn count_faces(volume: &Volume) -> u64 {
+#[cfg(test)]
+fn count_faces(volume: &Volume) -> u64 {
     slabs(volume)
         .into_par_iter()
         .map(|z0| Slab::read(volume, z0).count())

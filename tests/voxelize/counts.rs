@@ -118,8 +118,15 @@ fn closed_surfaces_keep_the_outside_out() {
                 ..Params::DEFAULT
             };
             let (volume, stats) = voxelize(mesh, &params, &Silent).expect("a grid");
-            let error = voxel_error::measure(mesh, &volume, &params, &stats.lattice(), &Silent)
-                .expect("measures");
+            let error = voxel_error::measure(
+                mesh,
+                &volume,
+                &params,
+                &stats.lattice(),
+                stats.orientation(),
+                &Silent,
+            )
+            .expect("measures");
             assert_eq!(error.leaks, Some(0), "{mode:?} at {resolution}");
             assert_eq!(error.not_conservative, 0);
             assert_eq!(error.surface_voxels, stats.set_voxels);
@@ -152,8 +159,15 @@ fn one_direction_lets_the_outside_in() {
     let cube = cuboid([2.3; 3], [5.6; 3]);
     let params = unit([8; 3], Mode::Z, Fill::None);
     let (volume, stats) = voxelize(&cube, &params, &Silent).expect("a grid");
-    let error =
-        voxel_error::measure(&cube, &volume, &params, &stats.lattice(), &Silent).expect("measures");
+    let error = voxel_error::measure(
+        &cube,
+        &volume,
+        &params,
+        &stats.lattice(),
+        stats.orientation(),
+        &Silent,
+    )
+    .expect("measures");
     // 4 x 4 x 4 centres are inside; the caps are set, the two layers between them lie open.
     assert_eq!(error.leaks, Some(32));
 }

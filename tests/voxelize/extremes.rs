@@ -36,14 +36,21 @@ fn a_triangle_between_the_lines_is_missed_by_all_but_the_conservative_rule() {
                 ..unit([6; 3], mode, Fill::None)
             };
             let (volume, stats) = voxelize(&mesh, &params, &Silent).expect("a grid");
-            let error = voxel_error::measure(&mesh, &volume, &params, &stats.lattice(), &Silent)
-                .expect("measures");
+            let error = voxel_error::measure(
+                &mesh,
+                &volume,
+                &params,
+                &stats.lattice(),
+                stats.orientation(),
+                &Silent,
+            )
+            .expect("measures");
             assert_eq!(
                 (error.missed_triangles, stats.set_voxels),
                 (missed, voxels),
                 "{mode:?}"
             );
-            assert_eq!(error.missed_area, missed as f64);
+            assert_eq!(error.missed_area, Some(missed as f64));
             assert_eq!((error.three_axis_voxels, error.conservative_voxels), (0, 1));
         }
     }
@@ -62,10 +69,39 @@ fn nothing_sets_nothing() {
                 let (bits, stats) = run(&Mesh::default(), &params);
                 assert_eq!((bits.count(), stats.set_voxels, stats.dims), (0, 0, [3; 3]));
                 assert!(stats.levels.iter().all(|l| l.nodes == 0));
-                assert!(stats.warnings.is_empty());
+                assert_eq!(warned(&stats, "nothing-set"), Some(1));
             }
         }
     }
+}
+
+#[test]
+fn vertices_that_nothing_uses_are_no_part_of_the_model() {
+    let cube = cuboid([0.0; 3], [1.0; 3]);
+    let mut more = cube.clone();
+    more.positions.extend([[1e6, 0.0, 0.0], [0.0, -3.0, 1e300]]);
+    for fill in [Fill::None, Fill::Parity, Fill::Winding] {
+        let params = Params {
+            fill,
+            ..resolution(8, Mode::Conservative)
+        };
+        let (bits, stats) = run(&cube, &params);
+        let (same, other) = run(&more, &params);
+        assert!(same == bits && other == stats, "{fill:?}");
+    }
+}
+
+#[test]
+fn a_grid_beside_the_model_is_told() {
+    let cube = cuboid([0.0; 3], [1.0; 3]);
+    let beside = Params {
+        bounds: Some([2.0, 0.0, 0.0, 3.0, 1.0, 1.0]),
+        ..resolution(4, Mode::Conservative)
+    };
+    let (bits, stats) = run(&cube, &beside);
+    assert_eq!((bits.count(), warned(&stats, "nothing-set")), (0, Some(1)));
+    let message = &stats.warnings[0].message;
+    assert!(message.contains("outside of the box"), "{message}");
 }
 
 #[test]
@@ -303,7 +339,7 @@ fn parameters_out_of_range_are_refused_with_the_option() {
         (size(Size::VoxelSize(f64::NAN)), "--voxel-size NaN: "),
         (
             size(Size::VoxelSize(1e-9)),
-            "a grid with voxels of 0.000000001 needs ",
+            "a grid with voxels of 1e-9 needs ",
         ),
         (
             Params {

@@ -303,6 +303,14 @@ impl<'a> Buffers<'a> {
         self.source.bytes().len() as u64
     }
 
+    /// The names of the files that the entries refer to, as they stand there decoded.
+    pub fn named_files(entries: &[BufferEntry]) -> Vec<String> {
+        let uris = entries.iter().filter_map(|entry| entry.uri.as_deref());
+        uris.filter(|uri| !uri.starts_with("data:"))
+            .filter_map(|uri| percent_decoded(uri).ok())
+            .collect()
+    }
+
     /// The bytes of a buffer, as many as it states.
     pub fn get(&mut self, index: usize) -> Result<&[u8], Refusal> {
         if !self.loaded.contains_key(&index) {

@@ -39,5 +39,13 @@ pub fn read(source: &Source, warnings: &mut Vec<Warning>) -> Result<Mesh, Refusa
     assemble::assemble(reader, &placed, source.limit(), warnings)
 }
 
+/// The names of the files that the buffers of a document refer to; none where it is not sound.
+pub fn named_files(bytes: &[u8]) -> Vec<String> {
+    let opened = document::open(bytes, &mut Vec::new());
+    opened.map_or(Vec::new(), |opened| {
+        document::Buffers::named_files(&opened.document.buffers)
+    })
+}
+
 #[cfg(test)]
 mod tests;

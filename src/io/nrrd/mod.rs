@@ -74,6 +74,13 @@ pub fn read(source: &Source, warnings: &mut Vec<Warning>) -> Result<Volume, Refu
     Ok(Volume { frame, data })
 }
 
+/// The name of the data file that a header gives, as it stands there; `None` for data of its own,
+/// and where the header is not sound.
+pub fn named_file(bytes: &[u8]) -> Option<String> {
+    let header = Header::parse(bytes).ok()?;
+    header.data_file().ok()?.map(str::to_owned)
+}
+
 /// What follows `lines` lines.
 fn after_lines(bytes: &[u8], lines: i64) -> Result<&[u8], Fault> {
     let mut rest = bytes;

@@ -38,7 +38,7 @@ fn parallel_squares_are_one_distance_apart() {
     // From two large triangles to many small ones the bound has to be searched for.
     assert!(d.hausdorff_bound <= d.hausdorff + 1.001e-4 * d.diagonal);
     assert!(!d.identical && d.hausdorff_bound >= d.hausdorff);
-    near(d.a.area, 1.0);
+    near(d.a.area.expect("finite"), 1.0);
     assert_eq!((d.volume_difference, d.a.closed), (None, false));
     let accuracy = d.accuracy();
     assert_eq!(

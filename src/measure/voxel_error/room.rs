@@ -23,10 +23,9 @@ impl Room {
 
     /// The grids, where their size is known beforehand, and the mesh.
     pub fn new(mesh: &Mesh, made: &Volume, params: &Params, lattice: &Lattice) -> Result<Room> {
-        let surface = !matches!(params.mode, Mode::Conservative | Mode::None);
-        let solid = params.fill != Fill::None;
+        let surface = params.mode != Mode::None && params.fill != Fill::None;
         let inside = !mesh.triangles.is_empty();
-        let grids = 3 + u128::from(surface) + u128::from(solid) + u128::from(inside);
+        let grids = 3 + u128::from(surface) + u128::from(inside);
         let grid = match made.data {
             Data::Sparse(_) => 0,
             _ => BitGrid::bytes_for(lattice.dims),

@@ -1,3 +1,4 @@
+use super::filled::INSIDE_SAMPLES;
 use super::*;
 use crate::mesh::shapes::{cuboid, octasphere, open_box, sheet, torus_knot};
 use crate::progress::Silent;
@@ -129,7 +130,15 @@ fn distances_from_and_to_the_surface_are_those_of_the_voxels() {
         .iter_mut()
         .for_each(|p| *p = [p[0] + 4.5, p[1] + 4.5, 3.25]);
     let of = |f: &dyn Fn(usize, usize, usize) -> bool, mode| {
-        measure(&mesh, &volume(9, f), &unit(9, mode), &lattice(9), &Silent).expect("measures")
+        measure(
+            &mesh,
+            &volume(9, f),
+            &unit(9, mode),
+            &lattice(9),
+            &Orientation::default(),
+            &Silent,
+        )
+        .expect("measures")
     };
     // One voxel, right above the square's middle.
     let one = of(&|x, y, z| (x, y, z) == (4, 4, 7), Mode::Conservative);
@@ -143,7 +152,7 @@ fn distances_from_and_to_the_surface_are_those_of_the_voxels() {
     // high side at (5, 5, 8).
     let farthest = (2.0f64 * 2.0 + 2.0 * 2.0 + 3.75 * 3.75).sqrt();
     assert!((one.from_surface_max.expect("a voxel") - farthest).abs() < 1e-12);
-    assert_eq!((one.missed_triangles, one.missed_area), (8, 1.0));
+    assert_eq!((one.missed_triangles, one.missed_area), (8, Some(1.0)));
     // Diagonally off a corner.
     let corner = of(&|x, y, z| (x, y, z) == (8, 8, 3), Mode::Conservative);
     let wanted = (1.5f64 * 1.5 * 2.0 + 0.25 * 0.25).sqrt();
@@ -163,11 +172,11 @@ fn distances_from_and_to_the_surface_are_those_of_the_voxels() {
         (nothing.to_surface_max, nothing.from_surface_max),
         (0.0, None)
     );
-    assert_eq!((nothing.missed_triangles, nothing.missed_area), (8, 1.0));
     assert_eq!(
-        (nothing.surface_voxels, nothing.three_axis_voxels),
-        (25, 25)
+        (nothing.missed_triangles, nothing.missed_area),
+        (8, Some(1.0))
     );
+    assert_eq!((nothing.surface_voxels, nothing.three_axis_voxels), (0, 25));
     assert_eq!(nothing.conservative_voxels, 49);
     assert_eq!(nothing.leaks, None);
 }
@@ -180,7 +189,17 @@ fn centres_inside_of_a_filled_model_are_on_it() {
         fill,
         ..unit(9, Mode::Conservative)
     };
-    let of = |fill| measure(&cube, &solid, &params(fill), &lattice(9), &Silent).expect("measures");
+    let of = |fill| {
+        measure(
+            &cube,
+            &solid,
+            &params(fill),
+            &lattice(9),
+            &Orientation::default(),
+            &Silent,
+        )
+        .expect("measures")
+    };
     // The middle voxel's centre is 1.9 from the upper face.
     let surface = of(Fill::None);
     assert!(
@@ -212,13 +231,15 @@ fn missed_triangles_are_those_without_a_voxel_of_their_own() {
         let held = volume(8, |x, y, z| (y, z) == (1, 1) && set.contains(&x));
         missed(&mesh, &held, [8; 3])
     };
-    assert_eq!(of(&[1, 3, 5]), (0, 0.0));
+    assert_eq!(of(&[1, 3, 5]), (0, Some(0.0)));
     let (count, share) = of(&[1, 5]);
+    let share = share.expect("triangles");
     assert!(
         count == 1 && (share - 1.0 / 6.0).abs() < 1e-12,
         "{count} {share}"
     );
     let (count, share) = of(&[3]);
+    let share = share.expect("triangles");
     assert!(
         count == 2 && (share - 5.0 / 6.0).abs() < 1e-12,
         "{count} {share}"
@@ -235,9 +256,16 @@ fn open_and_cut_surfaces_have_no_leaks_to_count() {
     let params = unit(9, Mode::ThreeAxis);
     let of = |mesh: &Mesh| {
         let (made, stats) = voxelize(mesh, &params, &Silent).expect("a grid");
-        measure(mesh, &made, &params, &stats.lattice(), &Silent)
-            .expect("measures")
-            .leaks
+        measure(
+            mesh,
+            &made,
+            &params,
+            &stats.lattice(),
+            stats.orientation(),
+            &Silent,
+        )
+        .expect("measures")
+        .leaks
     };
     assert_eq!(of(&cuboid([2.3; 3], [6.4; 3])), Some(0));
     assert_eq!(of(&open_box([2.3; 3], [6.4; 3])), None);
@@ -255,7 +283,15 @@ fn a_sphere_reaches_the_proven_bounds() {
                 ..unit(21, mode)
             };
             let (made, stats) = voxelize(&mesh, &params, &Silent).expect("a grid");
-            measure(&mesh, &made, &params, &stats.lattice(), &Silent).expect("measures")
+            measure(
+                &mesh,
+                &made,
+                &params,
+                &stats.lattice(),
+                stats.orientation(),
+                &Silent,
+            )
+            .expect("measures")
         };
         let error = of(Storage::Dense);
         assert_eq!(error, of(Storage::Sparse));
@@ -287,4 +323,138 @@ fn a_knot_of_many_voxels_does_not_leak() {
     let inside = made(Mode::None, Fill::Winding);
     assert_eq!(leaks(&made(Mode::ThreeAxis, Fill::None), &inside), 0);
     assert!(leaks(&made(Mode::Z, Fill::None), &inside) > 1000);
+}
+
+#[test]
+fn segments_and_points_are_sampled_as_triangles_are() {
+    let mut mesh = cuboid([2.3; 3], [4.4; 3]);
+    let from = mesh.positions.len() as u32;
+    mesh.positions
+        .extend([[9.5, 3.5, 3.5], [9.5, 5.5, 3.5], [3.5, 3.5, 9.5]]);
+    let cube = mesh.clone();
+    mesh.segments.push([from, from + 1]);
+    let of = |mesh: &Mesh, mode| {
+        let params = unit(11, mode);
+        let (made, stats) = voxelize(mesh, &params, &Silent).expect("a grid");
+        let lattice = stats.lattice();
+        measure(mesh, &made, &params, &lattice, stats.orientation(), &Silent).expect("measures")
+    };
+    // No line through centres meets a segment: its far end is 9.5 - 5 away in x, 5.5 - 4 in y.
+    let missed = of(&mesh, Mode::ThreeAxis);
+    let farthest = (4.5f64 * 4.5 + 1.5 * 1.5).sqrt();
+    let found = missed.from_surface_max.expect("voxels");
+    assert!((found - farthest).abs() < 1e-12, "{found}");
+    assert_eq!(of(&cube, Mode::ThreeAxis).samples + 17, missed.samples);
+    let met = of(&mesh, Mode::Conservative);
+    assert_eq!((met.from_surface_max, met.not_conservative), (Some(0.0), 0));
+    assert!(met.to_surface_max <= 0.75f64.sqrt());
+
+    let thin = Mesh {
+        triangles: Vec::new(),
+        points: vec![from + 2],
+        ..mesh.clone()
+    };
+    let met = of(&thin, Mode::Conservative);
+    assert_eq!((met.samples, met.from_surface_max), (18, Some(0.0)));
+    assert_eq!((met.missed_triangles, met.missed_area), (0, None));
+    let bounds = |error: &VoxelError| error.accuracy(Vec::new(), 1.0);
+    assert!(
+        bounds(&met)
+            .iter()
+            .all(|a| a.measure != "triangles none of whose voxels is set" || !a.verified)
+    );
+    let unmet = of(&thin, Mode::ThreeAxis);
+    assert_eq!((unmet.samples, unmet.from_surface_max), (18, None));
+    // Out of the grid there is no sample, and nothing is known.
+    let params = unit(2, Mode::Conservative);
+    let (made, stats) = voxelize(&thin, &params, &Silent).expect("a grid");
+    let lattice = stats.lattice();
+    let out = measure(
+        &thin,
+        &made,
+        &params,
+        &lattice,
+        stats.orientation(),
+        &Silent,
+    );
+    let out = out.expect("measures");
+    assert_eq!((out.samples, out.from_surface_max), (0, None));
+}
+
+#[test]
+fn a_voxel_too_many_is_found_in_every_mode() {
+    let cube = cuboid([2.3; 3], [6.4; 3]);
+    for mode in [Mode::Z, Mode::ThreeAxis, Mode::Conservative] {
+        let params = unit(9, mode);
+        let (made, stats) = voxelize(&cube, &params, &Silent).expect("a grid");
+        let of = |made: &Volume| {
+            let lattice = stats.lattice();
+            measure(&cube, made, &params, &lattice, stats.orientation(), &Silent).expect("measures")
+        };
+        assert_eq!(of(&made).not_conservative, 0);
+        for extra in [[4, 4, 4], [0, 8, 3], [1, 4, 4], [7, 7, 7]] {
+            let more = volume(9, |x, y, z| {
+                [x, y, z] == extra || Held::of(&made).get(x, y, z)
+            });
+            assert_eq!(of(&more).not_conservative, 1, "{extra:?}");
+        }
+    }
+}
+
+#[test]
+fn a_wrong_fill_is_no_error_of_nothing() {
+    let cube = cuboid([2.3; 3], [6.4; 3]);
+    let params = |fill| Params {
+        fill,
+        ..unit(9, Mode::None)
+    };
+    for fill in [Fill::Parity, Fill::Winding] {
+        let of = |f: &dyn Fn(usize, usize, usize) -> bool, orientation: &Orientation| {
+            let made = volume(9, f);
+            measure(
+                &cube,
+                &made,
+                &params(fill),
+                &lattice(9),
+                orientation,
+                &Silent,
+            )
+            .expect("measures")
+        };
+        let as_is = Orientation::default();
+        // Centres from 2.5 to 5.5 are inside: 4 x 4 x 4 of 9 x 9 x 9.
+        let solid = |x: usize, y: usize, z: usize| [x, y, z].iter().all(|c| (2..=5).contains(c));
+        let right = of(&solid, &as_is);
+        assert_eq!(
+            (
+                right.to_surface_max,
+                right.not_conservative,
+                right.inside_missed
+            ),
+            (0.0, 0, Some(0))
+        );
+        let samples = right.inside_samples.expect("a fill") as f64;
+        let share = 64.0 / 729.0 * INSIDE_SAMPLES as f64;
+        assert!((samples / share - 1.0).abs() < 0.05, "{samples} of {share}");
+        // A row that runs on to the border of the grid.
+        let leaked = of(&|x, y, z| solid(x, y, z) || (y, z) == (3, 3), &as_is);
+        assert!(
+            (leaked.to_surface_max - 2.1).abs() < 1e-12,
+            "{}",
+            leaked.to_surface_max
+        );
+        assert_eq!(leaked.not_conservative, 4);
+        // A hole of one voxel, whose centre is half a voxel from the next set one.
+        let holed = of(&|x, y, z| solid(x, y, z) && (x, y, z) != (3, 3, 3), &as_is);
+        assert!(holed.inside_missed.is_some_and(|n| n > 40));
+        assert_eq!(holed.from_surface_max, Some(0.5));
+        // The other way round nothing is inside by the winding number, and the same by parity.
+        let inverted = Orientation {
+            inverted: true,
+            ..Orientation::default()
+        };
+        let turned = of(&solid, &inverted);
+        assert_eq!(turned.inside_samples == Some(0), fill == Fill::Winding);
+        assert_eq!(turned.to_surface_max > 1.0, fill == Fill::Winding);
+    }
 }

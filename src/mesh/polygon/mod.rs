@@ -177,7 +177,8 @@ pub enum Split {
 ///
 /// Ear clipping: Meisters, "Polygons have ears", 1975; normal by Newell's method (Sutherland,
 /// Sproull and Schumacker, 1974).
-pub fn triangulate(positions: &[Vec3], face: &[u32], triangles: &mut Vec<[u32; 3]>) -> Split {
+#[cfg(test)]
+fn triangulate(positions: &[Vec3], face: &[u32], triangles: &mut Vec<[u32; 3]>) -> Split {
     triangulate_with(&mut Scratch::default(), positions, face, triangles)
 }
 

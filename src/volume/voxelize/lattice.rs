@@ -1,7 +1,7 @@
 //! Where the voxels are, and the way from file coordinates to grid coordinates.
 
 use super::{Params, Size};
-use crate::error::{Error, Fault, Result};
+use crate::error::{Error, Fault, Result, number};
 use crate::numeric::vector::{Vec3, sub};
 use crate::spatial::aabb::Aabb;
 use crate::volume::Frame;
@@ -84,8 +84,8 @@ impl Lattice {
             } + 2.0 * pad;
             if voxels > MAX_DIM as f64 {
                 return Err(Error::Limit {
-                    what: format!("a grid with voxels of {h}"),
-                    needed: format!("{voxels} voxels along {}", ["x", "y", "z"][a]),
+                    what: format!("a grid with voxels of {}", number(h)),
+                    needed: format!("{} voxels along {}", number(voxels), ["x", "y", "z"][a]),
                     limit: format!("{MAX_DIM} voxels"),
                     hint: Some("lower --resolution, or raise --voxel-size".to_owned()),
                 });
@@ -158,6 +158,12 @@ impl Lattice {
             }
         }
         Ok(())
+    }
+
+    /// Whether a box lies wholly outside of the grid.
+    pub(super) fn misses(&self, mesh: Aabb) -> bool {
+        let (lo, hi) = (self.to_grid(mesh.lo), self.to_grid(mesh.hi));
+        (0..3).any(|a| hi[a] < 0.0 || lo[a] > self.dims[a] as f64)
     }
 
     /// The same grid as the frame of a volume, which names the centre of the first voxel.

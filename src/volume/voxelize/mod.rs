@@ -240,6 +240,15 @@ impl Params {
     }
 }
 
+/// Which way round a fill took the triangles.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Orientation {
+    /// The triangles that were turned round to agree with their patch; empty for none.
+    pub reversed: Vec<bool>,
+    /// Whether the whole was then turned round, for enclosing more negative than positive space.
+    pub inverted: bool,
+}
+
 /// A level of the pyramid over the voxels.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
 pub struct LevelStats {
@@ -297,19 +306,21 @@ pub struct Stats {
     pub warnings: Vec<Warning>,
     #[serde(skip)]
     lattice: Lattice,
+    #[serde(skip)]
+    orientation: Orientation,
 }
 
 /// The voxels that a mesh sets.
 ///
 /// Voxel `(i, j, k)` is the cube from `origin + h (i, j, k)` to `origin + h (i + 1, j + 1, k + 1)`.
-/// Errs for parameters out of range, for a model without size or too far from the grid, and when
+/// The model is what triangles, segments and points use: other vertices count for nothing. Errs for parameters out of range, for a model without size or too far from the grid, and when
 /// the grid would not fit in `max_memory`. Cost: linear in the triangles and in the rows of voxels
 /// they span; a fill adds one pass over the triangles and one over the rows. The result is the same
 /// on any number of threads and for any order and winding of the triangles.
 pub fn voxelize(mesh: &Mesh, params: &Params, progress: &dyn Progress) -> Result<(Volume, Stats)> {
     params.check()?;
     progress.stage("fit", 0);
-    let bounds = mesh.bounds();
+    let bounds = mesh.used_bounds();
     let lattice = Lattice::fit(bounds, params)?;
     lattice.check_reach(bounds)?;
     let bytes = BitGrid::bytes_for(lattice.dims);
@@ -393,6 +404,21 @@ fn describe(
         Levels::Xy => pyramid::column_levels(volume),
     };
     let set_voxels = census.nodes.first().copied().unwrap_or(0);
+    let mut warnings = warnings(mesh, params, counts, inside.as_ref());
+    if set_voxels == 0 {
+        let why = if mesh.is_empty() {
+            "no voxel is set: the model has no triangle, segment or point"
+        } else if lattice.misses(mesh.used_bounds()) {
+            "no voxel is set: the model lies outside of the box to cover"
+        } else {
+            "no voxel is set"
+        };
+        warnings.push(Warning::new("nothing-set", why, 1, None));
+    }
+    let orientation = inside.as_ref().map(|(filling, border)| Orientation {
+        reversed: border.reversed.clone(),
+        inverted: filling.inverted,
+    });
     let filling = inside.as_ref().map(|(filling, _)| filling);
     Stats {
         dims: lattice.dims.map(|d| d as u64),
@@ -413,8 +439,9 @@ fn describe(
         degenerate_triangles: counts.degenerate,
         octree_nodes: census.made(),
         held_bytes,
-        warnings: warnings(mesh, params, counts, inside.as_ref()),
+        warnings,
         lattice: *lattice,
+        orientation: orientation.unwrap_or_default(),
     }
 }
 
@@ -471,8 +498,14 @@ fn warnings(
 
 impl Stats {
     /// Proven bounds on the error, none of them measured; the last is the one that [`TRADE`] names.
+    ///
+    /// What is inside is told by the winding number: parity on an open surface has no bound.
     pub fn bounds(&self) -> Vec<Accuracy> {
         let (to_surface, by) = match self.mode {
+            _ if self.fill == Fill::Parity && self.border_edges != Some(0) => (
+                None,
+                "no bound: the surface is open, and parity sets whole rows behind its openings",
+            ),
             Mode::Conservative => (
                 Some(3f64.sqrt() / 2.0),
                 "closed box overlap: half the diagonal of a voxel",
@@ -525,6 +558,11 @@ impl Stats {
     /// The grid the voxels stand in.
     pub fn lattice(&self) -> Lattice {
         self.lattice
+    }
+
+    /// Which way round the fill took the triangles; as they are without a fill.
+    pub fn orientation(&self) -> &Orientation {
+        &self.orientation
     }
 
     /// Octree nodes made against the nodes of the full tree.

@@ -52,7 +52,7 @@ impl Counts {
 impl<'a> Surface<'a> {
     /// The surface of `mesh` under a rule.
     pub fn new(mesh: &'a Mesh, lattice: Lattice, mode: Mode) -> Self {
-        let bounds = mesh.bounds();
+        let bounds = mesh.used_bounds();
         let corners = if bounds.is_empty() {
             [[0.0; 3]; 2]
         } else {
