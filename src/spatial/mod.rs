@@ -2,5 +2,5 @@
 
 pub mod aabb;
 pub mod bvh;
-pub mod bvh4;
 pub mod local;
+pub mod wide_bvh;
