@@ -164,8 +164,7 @@ impl Source {
         {
             return Err(Fault::whole(format!(
                 "names the data file {name:?}, which is not in its own folder or below"
-            ))
-            .into());
+            )));
         }
         if self.name == "-" {
             return Err(Fault::whole(format!(

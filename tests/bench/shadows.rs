@@ -243,20 +243,18 @@ impl Table {
             Axis::new(what, Scale::Log2),
             Axis::new("time (s)", Scale::Log),
         );
-        let seconds: [(&str, fn(&Row) -> f64); 2] =
-            [("octree", |row| row.octree), ("exact", |row| row.exact)];
-        let lines = found
-            .iter()
-            .flat_map(|scene| seconds.iter().map(move |by| (scene, by)));
-        for (index, ((name, rows), (method, seconds))) in lines.enumerate() {
-            let point = |row: &Row| Point {
-                x: f64::from(self.varied(row.setting)),
-                y: seconds(row),
-                ..Point::default()
+        for (index, (name, rows)) in found.iter().enumerate() {
+            let line = |seconds: &dyn Fn(&Row) -> f64| {
+                let point = |row: &Row| Point {
+                    x: f64::from(self.varied(row.setting)),
+                    y: seconds(row),
+                    ..Point::default()
+                };
+                rows.iter().map(point).collect()
             };
-            let points = rows.iter().map(point).collect();
-            plot.series
-                .push(Series::new(format!("{name}, {method}"), index, points));
+            let octree = Series::new(format!("{name}, octree"), 2 * index, line(&|r| r.octree));
+            let exact = Series::new(format!("{name}, exact"), 2 * index + 1, line(&|r| r.exact));
+            plot.series.extend([octree, exact]);
         }
         plot
     }

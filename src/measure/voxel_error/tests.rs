@@ -452,7 +452,9 @@ fn a_wrong_fill_is_no_error_of_nothing() {
         assert!((corner - 0.4 * 3f64.sqrt()).abs() < 1e-12, "{corner}");
         let made = volume(9, |x, y, z| solid(x, y, z) && (x, y, z) != (3, 3, 3));
         let inside = Inside::of(&cube, fill, &as_is).expect("a fill");
-        let filled = missed_inside(&cube, &made, &Cells::of(&made), &inside);
+        let room = Room::new(&cube, &made, &params(fill), &lattice(9)).expect("room");
+        let cells = Cells::of(&made, &room).expect("room");
+        let filled = missed_inside(&cube, &made, &cells, &inside);
         assert_eq!(filled.farthest, Some(0.5));
         // The other way round nothing is inside by the winding number, and the same by parity.
         let inverted = Orientation {

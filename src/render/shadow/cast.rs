@@ -43,7 +43,7 @@ pub(super) enum Voxels<'a> {
     /// An octree that is there.
     Octree(RayTree<'a>, &'a Octree),
     /// An octree made where rays go.
-    Lazy(Lazy<'a>),
+    Lazy(Box<Lazy<'a>>),
     /// Voxels to be looked at one by one.
     Each(&'a Data),
 }

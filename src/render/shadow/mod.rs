@@ -199,7 +199,7 @@ impl Model {
         let grid = match &self.grid {
             None if params.lazy => {
                 let lazy = Lazy::new(&self.mesh, &params.voxels(), progress)?;
-                Some((lazy.lattice(), Voxels::Lazy(lazy)))
+                Some((lazy.lattice(), Voxels::Lazy(Box::new(lazy))))
             }
             None => None,
             Some((volume, made)) => {

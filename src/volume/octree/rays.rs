@@ -355,7 +355,7 @@ impl<'a> Way<'a> {
             origin,
             direction,
             inverse: direction.map(|d| (1.0 / d.max(LEAST)) as f32),
-            flip: turned[0] * 0b001_001 | turned[1] * 0b010_010 | turned[2] * 0b100_100,
+            flip: (turned[0] * 0b001_001) | (turned[1] * 0b010_010) | (turned[2] * 0b100_100),
             is_turned,
             children: [0, 1, 2].map(|a| &MORTON[turned[a]][a]),
             voxels: [0, 1, 2].map(|a| &ROWS[turned[a]][a]),
