@@ -37,7 +37,7 @@ const PARTS: &[Part] = &[
     },
 ];
 
-const ADVICE_ON_SHADOW: &str = "Choose `exact` for meshes of this size: its rays cost no more than those through voxels, and what error is left is the noise of few rays, which `--rays` buys down. The octree earns its place against walking the grid: at 512 voxels it answers the same rays, to the bit, in about a quarter of the time, from 1.6 % of the nodes. With conservative voxels neither lets light through; the error is false shadow of about a voxel around the true one.";
+const ADVICE_ON_SHADOW: &str = "Choose `exact` for meshes of this size: its rays cost no more than those through voxels, and what error is left is the noise of few rays, which `--rays` buys down. Choose `octree` where many small triangles stand apart, as the twigs of [a tree](shadow.md) do: there its shadow rays take about four fifths of the time of exact ones. Against walking the grid it answers the same rays, to the bit, in less than a quarter of the time at 512 voxels and 16 rays, from 1.6 % of the nodes. With conservative voxels neither lets light through; the error is false shadow of about a voxel around the true one.";
 
 const OPENING: &str = "\
 # The trade
