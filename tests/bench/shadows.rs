@@ -1,7 +1,7 @@
 //! Shadow rays: Tables 2 and 3 of Forest, Barthe and Paulin (2009) in layout, with what they lack.
 
 use super::{Plan, scenes};
-use scantle::image::plot::{Axis, Plot, Point, Scale, Series};
+use scantle::image::plot::{Axis, Line, Plot, Point, Scale, Series};
 use scantle::mesh::Mesh;
 use scantle::progress::{Progress, Silent};
 use scantle::render::shadow::{self, Method, Near, Params};
@@ -244,16 +244,20 @@ impl Table {
             Axis::new("time (s)", Scale::Log),
         );
         for (index, (name, rows)) in found.iter().enumerate() {
-            let line = |seconds: &dyn Fn(&Row) -> f64| {
+            let line = |method: &str, look: usize, seconds: &dyn Fn(&Row) -> f64| {
                 let point = |row: &Row| Point {
                     x: f64::from(self.varied(row.setting)),
                     y: seconds(row),
                     ..Point::default()
                 };
-                rows.iter().map(point).collect()
+                let points = rows.iter().map(point).collect();
+                Series {
+                    line: Line::Straight,
+                    ..Series::new(format!("{name}, {method}"), look, points)
+                }
             };
-            let octree = Series::new(format!("{name}, octree"), 2 * index, line(&|r| r.octree));
-            let exact = Series::new(format!("{name}, exact"), 2 * index + 1, line(&|r| r.exact));
+            let octree = line("octree", 2 * index, &|r| r.octree);
+            let exact = line("exact", 2 * index + 1, &|r| r.exact);
             plot.series.extend([octree, exact]);
         }
         plot

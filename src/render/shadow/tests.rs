@@ -35,7 +35,8 @@ fn verified(mesh: &Mesh, params: &Params) -> Verified {
         ..params.clone()
     };
     let (_, stats) = draw(mesh, &params, &Silent).expect("a picture");
-    assert!(stats.shaded > 100 && stats.shadow_rays > stats.shaded);
+    let meant = stats.shaded * u64::from(params.rays);
+    assert!(stats.shaded > 100 && (meant / 2..=meant).contains(&stats.shadow_rays));
     stats.verified.expect("was asked for")
 }
 
