@@ -1,7 +1,9 @@
 //! Volumes: dense and sparse voxel grids, and the conversions from and to meshes.
 
 pub mod bits;
+pub mod isosurface;
 pub mod octree;
+pub mod smooth_mc;
 pub mod surface;
 pub mod trace;
 pub mod voxelize;

@@ -37,31 +37,12 @@ use crate::error::{Error, Result};
 use crate::mesh::Mesh;
 use crate::progress::Progress;
 use crate::report::{Accuracy, Modelled, Warning};
+use crate::trade::named;
 use fill::Filling;
 use raster::{Counts, Surface};
 use schemars::JsonSchema;
 use serde::Serialize;
 use winding::Border;
-
-/// Names of the values of an option, as the command line and the report write them.
-macro_rules! named {
-    ($type:ident { $($variant:ident = $name:literal),* $(,)? }) => {
-        impl $type {
-            /// The names of all values.
-            pub const NAMES: &'static [&'static str] = &[$($name),*];
-
-            /// The name of this value.
-            pub fn name(self) -> &'static str {
-                match self { $($type::$variant => $name),* }
-            }
-
-            /// The value of a name.
-            pub fn from_name(name: &str) -> Option<Self> {
-                match name { $($name => Some($type::$variant),)* _ => None }
-            }
-        }
-    };
-}
 
 /// Which voxels a surface sets.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]

@@ -1,0 +1,334 @@
+//! The parts of a surface that do not touch, and what each encloses.
+
+use super::fair::{Fair, Inflate};
+use super::region::Region;
+use crate::numeric::vector::{Vec3, cross, dot, length, sub};
+use crate::volume::isosurface::{NONE, Surface, axis_of};
+use rayon::prelude::*;
+use std::collections::BTreeMap;
+use wide::f32x4;
+
+/// Triangles that one thread sums at a time; fixed, so that sums never follow the threads.
+const CHUNK: usize = 1 << 13;
+
+/// The farthest that a part is moved at once, in the smallest spacing: its normals hold no farther.
+const FARTHEST: f64 = 0.25;
+
+/// What is enclosed is held to this share, where the regions allow it.
+const CLOSE: f64 = 1e-6;
+
+/// Most rounds of filling.
+const ROUNDS: usize = 12;
+
+/// The parts of a surface, numbered by their first vertices.
+pub(super) struct Parts {
+    of: Vec<u32>,
+    /// Vertices of each.
+    pub sizes: Vec<u64>,
+    /// Voxels within each, less those of a cavity; `None` for those that are open.
+    pub voxels: Vec<Option<i64>>,
+    /// The first place of each, from which its volume is summed.
+    origins: Vec<[i32; 3]>,
+}
+
+impl Parts {
+    /// Vertices of one polygon belong together. Cost: near linear.
+    pub(super) fn find(surface: &Surface) -> Parts {
+        let mut parent: Vec<u32> = (0..surface.len() as u32).collect();
+        fn root(parent: &mut [u32], mut v: u32) -> u32 {
+            while parent[v as usize] != v {
+                let above = parent[parent[v as usize] as usize];
+                parent[v as usize] = above;
+                v = above;
+            }
+            v
+        }
+        let mut corners = &surface.loops.corners[..];
+        for length in &surface.loops.lengths {
+            let (polygon, rest) = corners.split_at(usize::from(*length));
+            corners = rest;
+            let mut low = root(&mut parent, polygon[0]);
+            for v in &polygon[1..] {
+                let other = root(&mut parent, *v);
+                let (least, most) = (low.min(other), low.max(other));
+                parent[most as usize] = least;
+                low = least;
+            }
+        }
+        let mut parts = Parts {
+            of: vec![0; surface.len()],
+            sizes: Vec::new(),
+            voxels: Vec::new(),
+            origins: Vec::new(),
+        };
+        for v in 0..surface.len() {
+            // Roots are the lowest of their part, so the parent of any other has its number by now.
+            let up = parent[v] as usize;
+            let part = if up == v {
+                parts.sizes.push(0);
+                parts.voxels.push(Some(0));
+                parts.origins.push(surface.places[v]);
+                parts.sizes.len() as u32 - 1
+            } else {
+                parts.of[up]
+            };
+            parts.of[v] = part;
+            let part = part as usize;
+            parts.sizes[part] += 1;
+            if surface.links[v].contains(&NONE) {
+                parts.voxels[part] = None;
+            }
+        }
+        parts.count_voxels(surface);
+        parts
+    }
+
+    /// A face between voxels has its middle at a vertex, and a box of voxels ends at its faces: voxels
+    /// are what the faces across x enclose, in whole numbers.
+    fn count_voxels(&mut self, surface: &Surface) {
+        let mut doubled = vec![0i64; self.len()];
+        for (v, place) in surface.places.iter().enumerate() {
+            if axis_of(*place) == 0 {
+                let part = self.of[v] as usize;
+                let from = i64::from(place[0]) - i64::from(self.origins[part][0]);
+                doubled[part] += if surface.lower_inside[v] { from } else { -from };
+            }
+        }
+        for (voxels, doubled) in self.voxels.iter_mut().zip(doubled) {
+            *voxels = voxels.map(|_| doubled / 2);
+        }
+    }
+
+    pub(super) fn len(&self) -> usize {
+        self.sizes.len()
+    }
+
+    /// What each part encloses, in voxels, its polygons split at their first corners.
+    pub(super) fn enclosed(
+        &self,
+        surface: &Surface,
+        offset: impl Fn(usize) -> Vec3 + Sync,
+    ) -> Vec<f64> {
+        let sums = self.sum(surface, [1.0; 3], &offset);
+        sums.into_iter().map(|s| s.volume).collect()
+    }
+
+    /// What each part encloses, in voxels, as these triangles do.
+    pub(super) fn enclosed_by(
+        &self,
+        surface: &Surface,
+        triangles: &[[u32; 3]],
+        offset: impl Fn(usize) -> Vec3 + Sync,
+    ) -> Vec<f64> {
+        let sums = self.sum_triangles(surface, triangles, [1.0; 3], &offset);
+        sums.into_iter().map(|s| s.volume).collect()
+    }
+
+    fn sum(
+        &self,
+        surface: &Surface,
+        metric: Vec3,
+        offset: &(impl Fn(usize) -> Vec3 + Sync),
+    ) -> Vec<Sum> {
+        let chunks = surface.loops.chunks();
+        let partial: Vec<BTreeMap<u32, Sum>> = chunks
+            .into_par_iter()
+            .map(|(lengths, mut corners)| {
+                let mut sums = Sums::new(self, surface, metric);
+                for length in lengths {
+                    let (polygon, rest) = corners.split_at(usize::from(*length));
+                    corners = rest;
+                    for i in 1..polygon.len() - 1 {
+                        sums.add([polygon[0], polygon[i], polygon[i + 1]], offset);
+                    }
+                }
+                sums.done()
+            })
+            .collect();
+        self.gather(partial)
+    }
+
+    fn sum_triangles(
+        &self,
+        surface: &Surface,
+        triangles: &[[u32; 3]],
+        metric: Vec3,
+        offset: &(impl Fn(usize) -> Vec3 + Sync),
+    ) -> Vec<Sum> {
+        let partial: Vec<BTreeMap<u32, Sum>> = triangles
+            .par_chunks(CHUNK)
+            .map(|chunk| {
+                let mut sums = Sums::new(self, surface, metric);
+                for t in chunk {
+                    sums.add(*t, offset);
+                }
+                sums.done()
+            })
+            .collect();
+        self.gather(partial)
+    }
+
+    fn gather(&self, partial: Vec<BTreeMap<u32, Sum>>) -> Vec<Sum> {
+        let mut all = vec![Sum::default(); self.len()];
+        for (part, sum) in partial.into_iter().flatten() {
+            all[part as usize].volume += sum.volume;
+            all[part as usize].area += sum.area;
+        }
+        all
+    }
+
+    /// What is to be enclosed while the surface is smoothed.
+    pub(super) fn target<'a>(&'a self, surface: &'a Surface, metric: Vec3) -> Target<'a> {
+        Target {
+            parts: self,
+            surface,
+            metric,
+        }
+    }
+
+    /// How far each part is to be moved outwards, in the smallest spacing.
+    fn missing(&self, sums: &[Sum], metric: Vec3) -> Vec<f64> {
+        let voxel = metric[0] * metric[1] * metric[2];
+        let by = |(part, sum): (usize, &Sum)| {
+            let wanted = self.voxels[part].map_or(sum.volume, |v| v as f64 * voxel);
+            let by = (wanted - sum.volume) / sum.area;
+            if by.is_finite() {
+                by.clamp(-FARTHEST, FARTHEST)
+            } else {
+                0.0
+            }
+        };
+        sums.iter().enumerate().map(by).collect()
+    }
+
+    /// Moves each part along its normals until it encloses its voxels, as far as the regions let it.
+    pub(super) fn fill(
+        &self,
+        surface: &Surface,
+        triangles: &[[u32; 3]],
+        metric: Vec3,
+        regions: &(dyn Fn(usize) -> Region + Sync),
+        offsets: &mut Vec<Vec3>,
+    ) {
+        let fair = Fair::new(surface, metric, regions);
+        let voxel = metric[0] * metric[1] * metric[2];
+        for _ in 0..ROUNDS {
+            let sums = self.sum_triangles(surface, triangles, metric, &|v| offsets[v]);
+            let far = |(part, sum): (usize, &Sum)| {
+                let wanted = self.voxels[part].map_or(sum.volume, |v| v as f64 * voxel);
+                (sum.volume - wanted).abs() > CLOSE * wanted.abs()
+            };
+            let open: Vec<bool> = sums.iter().enumerate().map(far).collect();
+            if !open.contains(&true) {
+                break;
+            }
+            let by = self.missing(&sums, metric);
+            let at: Vec<f32x4> = offsets.iter().map(|o| single(*o, metric)).collect();
+            offsets
+                .par_iter_mut()
+                .with_min_len(1 << 12)
+                .enumerate()
+                .for_each(|(v, offset)| {
+                    let part = self.of[v] as usize;
+                    if open[part] {
+                        let normal = fair.normal(&at, v).to_array();
+                        let moved = std::array::from_fn(|a| {
+                            offset[a] + f64::from(normal[a]) * by[part] / metric[a]
+                        });
+                        *offset = regions(v).project(moved, metric);
+                    }
+                });
+        }
+    }
+}
+
+/// An offset in voxels, in single precision and the smallest spacing.
+pub(super) fn single(offset: Vec3, metric: Vec3) -> f32x4 {
+    let o: [f32; 3] = std::array::from_fn(|a| (offset[a] * metric[a]) as f32);
+    f32x4::from([o[0], o[1], o[2], 0.0])
+}
+
+/// Volume and area.
+#[derive(Debug, Clone, Copy, Default)]
+struct Sum {
+    volume: f64,
+    area: f64,
+}
+
+/// Sums over some triangles, part by part.
+struct Sums<'a> {
+    parts: &'a Parts,
+    surface: &'a Surface,
+    metric: Vec3,
+    all: BTreeMap<u32, Sum>,
+    current: u32,
+    sum: Sum,
+}
+
+impl<'a> Sums<'a> {
+    fn new(parts: &'a Parts, surface: &'a Surface, metric: Vec3) -> Self {
+        Sums {
+            parts,
+            surface,
+            metric,
+            all: BTreeMap::new(),
+            current: 0,
+            sum: Sum::default(),
+        }
+    }
+
+    fn add(&mut self, triangle: [u32; 3], offset: &impl Fn(usize) -> Vec3) {
+        let part = self.parts.of[triangle[0] as usize];
+        if part != self.current {
+            self.flush();
+            self.current = part;
+        }
+        let origin = self.parts.origins[part as usize];
+        let [a, b, c] = triangle.map(|v| {
+            let (place, moved) = (self.surface.places[v as usize], offset(v as usize));
+            let at = |axis: usize| {
+                let steps = 0.5 * f64::from(place[axis] - origin[axis]) + moved[axis];
+                steps * self.metric[axis]
+            };
+            [at(0), at(1), at(2)]
+        });
+        let normal = cross(sub(b, a), sub(c, a));
+        self.sum.volume += dot(normal, a) / 6.0;
+        self.sum.area += 0.5 * length(normal);
+    }
+
+    fn flush(&mut self) {
+        let sum = std::mem::take(&mut self.sum);
+        let all = self.all.entry(self.current).or_default();
+        all.volume += sum.volume;
+        all.area += sum.area;
+    }
+
+    fn done(mut self) -> BTreeMap<u32, Sum> {
+        self.flush();
+        self.all
+    }
+}
+
+/// What the parts are to enclose.
+pub(super) struct Target<'a> {
+    parts: &'a Parts,
+    surface: &'a Surface,
+    metric: Vec3,
+}
+
+impl Inflate for Target<'_> {
+    fn by(&self, offsets: &[f32x4]) -> Vec<f32> {
+        let voxels = |v: usize| {
+            let o = offsets[v].to_array();
+            std::array::from_fn(|a| f64::from(o[a]) / self.metric[a])
+        };
+        let sums = self.parts.sum(self.surface, self.metric, &voxels);
+        let by = self.parts.missing(&sums, self.metric);
+        by.into_iter().map(|b| b as f32).collect()
+    }
+
+    fn part_of(&self, vertex: usize) -> usize {
+        self.parts.of[vertex] as usize
+    }
+}

@@ -1,0 +1,163 @@
+//! The paper's relaxation: each vertex to the mean of its neighbours, clipped.
+
+use super::region::Region;
+use super::{Outcome, Params, Stop, Update};
+use crate::numeric::vector::{Vec3, add, length, scale, sub};
+use crate::volume::isosurface::{NONE, Surface};
+use rayon::prelude::*;
+
+/// Vertices that one thread moves at a time.
+const CHUNK: usize = 1 << 12;
+
+/// A vertex lies still when it and its neighbours moved by less than this share of the threshold.
+const STILL: f64 = 0.1;
+
+pub(super) struct Relax<'a> {
+    surface: &'a Surface,
+    metric: Vec3,
+    regions: &'a (dyn Fn(usize) -> Region + Sync),
+    /// Neighbours of vertex `v`: `neighbours[starts[v]..starts[v + 1]]`, by their places.
+    starts: Vec<u32>,
+    neighbours: Vec<u32>,
+}
+
+impl<'a> Relax<'a> {
+    /// Neighbours are the other ends of a vertex's edges; at the end of a surface, those that lie there
+    /// too. They are taken in the order of their places, so that no numbering of vertices matters.
+    pub(super) fn new(
+        surface: &'a Surface,
+        triangles: &[[u32; 3]],
+        metric: Vec3,
+        regions: &'a (dyn Fn(usize) -> Region + Sync),
+    ) -> Self {
+        let n = surface.len();
+        let ends = |v: u32| surface.links[v as usize].contains(&NONE);
+        let mut counts = vec![0u32; n + 1];
+        for v in triangles.iter().flatten() {
+            counts[*v as usize + 1] += 2;
+        }
+        for v in 0..n {
+            counts[v + 1] += counts[v];
+        }
+        let mut filled = counts.clone();
+        let mut all = vec![0u32; counts[n] as usize];
+        for t in triangles {
+            for i in 0..3 {
+                let v = t[i] as usize;
+                all[filled[v] as usize] = t[(i + 1) % 3];
+                all[filled[v] as usize + 1] = t[(i + 2) % 3];
+                filled[v] += 2;
+            }
+        }
+        let mut starts = Vec::with_capacity(n + 1);
+        let mut neighbours = Vec::with_capacity(all.len() / 2);
+        starts.push(0);
+        for v in 0..n {
+            let own = &mut all[counts[v] as usize..counts[v + 1] as usize];
+            own.sort_unstable_by_key(|w| (surface.places[*w as usize], *w));
+            let first = neighbours.len();
+            for w in own {
+                let stays = !ends(v as u32) || ends(*w);
+                if stays && neighbours[first..].last() != Some(w) {
+                    neighbours.push(*w);
+                }
+            }
+            starts.push(neighbours.len() as u32);
+        }
+        Relax {
+            surface,
+            metric,
+            regions,
+            starts,
+            neighbours,
+        }
+    }
+
+    pub(super) fn run(&self, params: &Params, advance: &(dyn Fn() + Sync)) -> (Vec<Vec3>, Outcome) {
+        let n = self.surface.len();
+        let mut offsets = vec![[0.0; 3]; n];
+        let mut next = offsets.clone();
+        let mut awake = vec![true; n];
+        let mut outcome = Outcome::default();
+        let still = STILL * params.threshold;
+        for _ in 0..params.max_iterations {
+            let moved: Vec<f64> = match params.update {
+                Update::Jacobi => {
+                    let moved = next
+                        .par_iter_mut()
+                        .enumerate()
+                        .with_min_len(CHUNK)
+                        .map(|(v, to)| {
+                            *to = if awake[v] {
+                                self.target(v, &offsets)
+                            } else {
+                                offsets[v]
+                            };
+                            self.way(*to, offsets[v])
+                        })
+                        .collect();
+                    std::mem::swap(&mut offsets, &mut next);
+                    moved
+                }
+                Update::GaussSeidel => (0..n)
+                    .map(|v| {
+                        if !awake[v] {
+                            return 0.0;
+                        }
+                        let to = self.target(v, &offsets);
+                        let way = self.way(to, offsets[v]);
+                        offsets[v] = to;
+                        way
+                    })
+                    .collect(),
+            };
+            outcome.iterations += 1;
+            outcome.updates += awake.iter().filter(|a| **a).count() as u64;
+            outcome.last_step = moved.iter().copied().fold(0.0, f64::max);
+            advance();
+            if outcome.last_step < params.threshold {
+                outcome.stop = Stop::Threshold;
+                break;
+            }
+            awake
+                .par_iter_mut()
+                .enumerate()
+                .with_min_len(CHUNK)
+                .for_each(|(v, awake)| {
+                    let near = self.near(v).iter().any(|w| moved[*w as usize] >= still);
+                    *awake = near || moved[v] >= still;
+                });
+            if !awake.contains(&true) {
+                outcome.stop = Stop::Still;
+                break;
+            }
+        }
+        (offsets, outcome)
+    }
+
+    fn near(&self, v: usize) -> &[u32] {
+        &self.neighbours[self.starts[v] as usize..self.starts[v + 1] as usize]
+    }
+
+    /// How far apart two offsets are, in the smallest spacing.
+    fn way(&self, a: Vec3, b: Vec3) -> f64 {
+        let d = sub(a, b);
+        length(std::array::from_fn(|axis| d[axis] * self.metric[axis]))
+    }
+
+    /// The mean of the neighbours from the vertex's first place, clipped.
+    fn target(&self, v: usize, offsets: &[Vec3]) -> Vec3 {
+        let near = self.near(v);
+        if near.is_empty() {
+            return offsets[v];
+        }
+        let at = self.surface.places[v];
+        let mut sum = [0.0; 3];
+        for w in near {
+            let place = self.surface.places[*w as usize];
+            let step = std::array::from_fn(|a| 0.5 * f64::from(place[a] - at[a]));
+            sum = add(sum, add(step, offsets[*w as usize]));
+        }
+        (self.regions)(v).clip(scale(sum, 1.0 / near.len() as f64))
+    }
+}

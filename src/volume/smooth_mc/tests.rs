@@ -1,0 +1,56 @@
+use super::*;
+use crate::numeric::vector::{cross, dot, length, normalize, sub};
+use crate::progress::Silent;
+use crate::volume::isosurface::{Border, Select, extract};
+use crate::volume::{Data, Frame, Volume};
+
+fn ball(radius: f64, n: usize, at: f64) -> Volume {
+    let mut v = Vec::new();
+    for z in 0..n {
+        for y in 0..n {
+            for x in 0..n {
+                let d = [x, y, z].map(|c| c as f64 - at);
+                v.push(u8::from(dot(d, d) <= radius * radius));
+            }
+        }
+    }
+    Volume {
+        frame: Frame::straight([n; 3], [0.0; 3], [1.0; 3]),
+        data: Data::U8(v),
+    }
+}
+
+/// Root mean square of the angle between triangles and a ball's surface, by area, in degrees.
+fn normal_rms(positions: &[Vec3], triangles: &[[u32; 3]], centre: f64) -> f64 {
+    let (mut sum, mut area) = (0.0, 0.0);
+    for t in triangles {
+        let [a, b, c] = t.map(|v| positions[v as usize]);
+        let n = cross(sub(b, a), sub(c, a));
+        let m = [0, 1, 2].map(|i| (a[i] + b[i] + c[i]) / 3.0 - centre);
+        let size = length(n);
+        if size > 0.0 {
+            let cos = dot(normalize(n), normalize(m)).clamp(-1.0, 1.0);
+            sum += size * cos.acos().to_degrees().powi(2);
+            area += size;
+        }
+    }
+    (sum / area).sqrt()
+}
+
+#[test]
+fn a_ball_becomes_round_and_keeps_its_volume() {
+    let centre = 42.623;
+    let ball = ball(40.0, 86, centre);
+    let surface = extract(&ball, &Select::Set, Border::Closed, &Silent).expect("a surface");
+    let (offsets, triangles, stats) =
+        smooth(&surface, None, [1.0; 3], &Params::DEFAULT, &Silent).expect("a smooth surface");
+    let positions = surface.positions(&ball.frame, |v| offsets[v]);
+    let rms = normal_rms(&positions, &triangles, centre);
+    println!("{rms} {stats:?}");
+    assert!(rms <= 3.0, "{rms}");
+    let voxels = stats.voxels.expect("closed") as f64;
+    assert_eq!(voxels, ball.count_set() as f64);
+    let volume = stats.volume_after.expect("closed");
+    assert!((volume / voxels - 1.0).abs() <= 1e-3, "{volume} {voxels}");
+    assert!(stats.max_displacement <= 0.5);
+}
