@@ -4,6 +4,8 @@ mod hausdorff;
 pub mod image_difference;
 pub mod mesh_distance;
 pub mod report_difference;
+mod sides;
+pub mod smooth_error;
 pub mod stability;
 mod surface;
 #[cfg(test)]

@@ -54,6 +54,13 @@ impl Frame {
         })
     }
 
+    /// Whether the axes are left-handed.
+    pub fn is_mirrored(&self) -> bool {
+        use crate::numeric::vector::{cross, dot, normalize};
+        let [x, y, z] = self.axes.map(normalize);
+        dot(cross(x, y), z) < 0.0
+    }
+
     /// Number of voxels.
     pub fn len(&self) -> usize {
         self.dims.iter().product()

@@ -4,7 +4,7 @@ use super::bits::BitGrid;
 use super::{Data, Frame, Volume};
 use crate::error::{Error, Result};
 use crate::mesh::{Mesh, Polygons};
-use crate::numeric::vector::{Vec3, add, cross, dot, normalize, scale};
+use crate::numeric::vector::{Vec3, add, scale};
 use rayon::prelude::*;
 
 /// Slices that one thread works on at a time.
@@ -73,7 +73,7 @@ pub fn boundary_faces(volume: &Volume) -> Result<Mesh> {
             base
         })
         .collect();
-    let flip = is_mirrored(&volume.frame);
+    let flip = volume.frame.is_mirrored();
     let parts: Vec<(Vec<Vec3>, Vec<[u32; 4]>)> = starts
         .par_iter()
         .zip(&bases)
@@ -95,12 +95,6 @@ pub fn boundary_faces(volume: &Volume) -> Result<Mesh> {
     let starts = (0..=faces as u32).map(|f| 4 * f).collect();
     mesh.polygons = Some(Polygons { starts, corners });
     Ok(mesh)
-}
-
-/// Whether the axes of a grid are left-handed.
-fn is_mirrored(frame: &Frame) -> bool {
-    let [x, y, z] = frame.axes.map(normalize);
-    dot(cross(x, y), z) < 0.0
 }
 
 fn slabs(volume: &Volume) -> Vec<usize> {
@@ -388,6 +382,7 @@ fn reduce_slice(volume: &Volume, z: usize, shift: u32, words: &mut [u64]) {
 mod tests {
     use super::*;
     use crate::numeric::rng::Rng;
+    use crate::numeric::vector::{cross, dot};
     use std::collections::BTreeMap;
 
     fn random(dims: [usize; 3], share: f64, seed: u64) -> Volume {

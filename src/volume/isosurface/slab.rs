@@ -9,6 +9,55 @@ use wide::u8x16;
 /// Slices that one thread works on at a time.
 pub(super) const SLAB: usize = 8;
 
+/// Labels to be told apart, ascending; each is known by its number in the list plus one, and all others
+/// by 0.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Labels {
+    values: Vec<f64>,
+    /// For whole numbers from 0 to 65535.
+    table: Vec<u16>,
+}
+
+/// Most labels: one number of 16 bits is that of the rest.
+pub const MOST_LABELS: usize = u16::MAX as usize - 1;
+
+impl Labels {
+    /// Labels of these values, each once, in any order; at most [`MOST_LABELS`].
+    pub fn new(mut values: Vec<f64>) -> Self {
+        values.sort_by(f64::total_cmp);
+        values.dedup();
+        values.truncate(MOST_LABELS);
+        let mut table = vec![0; 1 << 16];
+        for (i, value) in values.iter().enumerate() {
+            if value.fract() == 0.0 && (0.0..65_536.0).contains(value) {
+                table[*value as usize] = i as u16 + 1;
+            }
+        }
+        Labels { values, table }
+    }
+
+    /// The values, ascending: label `i + 1` is the i-th.
+    pub fn values(&self) -> &[f64] {
+        &self.values
+    }
+
+    #[inline]
+    fn number(&self, value: f64) -> u16 {
+        let whole = value as usize;
+        if whole as f64 == value && whole < self.table.len() {
+            return self.table[whole];
+        }
+        let found = self.values.binary_search_by(|v| v.total_cmp(&value));
+        found.map_or(0, |i| i as u16 + 1)
+    }
+}
+
+/// What a slab is read for.
+pub(super) enum Source<'a> {
+    Select(&'a Select),
+    Labels(&'a Labels),
+}
+
 /// Slices of a grid with a margin of one voxel all around that is outside.
 ///
 /// Plane `p` is slice `first + p - 1` of the margin's grid: one below and two above those that the
@@ -21,7 +70,11 @@ pub(super) struct Slab {
     pub ny: usize,
     /// Words of a row.
     pub stride: usize,
+    /// Voxels of the margin's grid along x.
+    nx: usize,
     inside: Vec<u64>,
+    /// Where there are labels, their numbers; else empty.
+    labels: Vec<u16>,
     crossed: [Vec<u64>; 3],
 }
 
@@ -68,7 +121,7 @@ impl Extent {
 
 impl Slab {
     /// Reads the slices from `first` on.
-    pub(super) fn read(volume: &Volume, select: &Select, extent: &Extent, first: usize) -> Slab {
+    pub(super) fn read(volume: &Volume, source: &Source, extent: &Extent, first: usize) -> Slab {
         let [nx, ny, _] = extent.dims;
         let count = SLAB.min(extent.slices().end - first);
         let stride = nx.div_ceil(64);
@@ -78,12 +131,101 @@ impl Slab {
             count,
             ny,
             stride,
+            nx,
             inside: vec![0; rows * stride],
+            labels: Vec::new(),
             crossed: [(); 3].map(|()| vec![0; rows * stride]),
         };
-        slab.fill(volume, select);
-        slab.cross(extent);
+        match source {
+            Source::Select(select) => {
+                slab.fill(volume, select);
+                slab.cross(extent);
+            }
+            Source::Labels(labels) => {
+                slab.labels = vec![0; rows * nx];
+                slab.fill_labels(volume, labels);
+                slab.cross_labels();
+            }
+        }
         slab
+    }
+
+    fn fill_labels(&mut self, volume: &Volume, labels: &Labels) {
+        let [nx, ny, nz] = volume.frame.dims;
+        let width = self.nx;
+        for plane in 0..self.count + 3 {
+            let Some(z) = (self.first + plane).checked_sub(2).filter(|z| *z < nz) else {
+                continue;
+            };
+            for y in 0..ny {
+                let at = (plane * self.ny + y + 1) * width + 1;
+                let to = &mut self.labels[at..at + nx];
+                with_samples!(&volume.data, v => {
+                    let from = &v[(z * ny + y) * nx..][..nx];
+                    for (to, from) in to.iter_mut().zip(from) {
+                        *to = labels.number(*from as f64);
+                    }
+                }, _ => {
+                    let mut row = BitGrid::new([nx, ny, 1]);
+                    volume.read_bit_slices(z, &mut row);
+                    for (x, to) in to.iter_mut().enumerate() {
+                        *to = labels.number(f64::from(u8::from(row.get(x, y, 0))));
+                    }
+                });
+            }
+        }
+    }
+
+    fn cross_labels(&mut self) {
+        let (width, stride) = (self.nx, self.stride);
+        let rows = self.labels.len() / width;
+        for row in 0..rows {
+            let at = row * width;
+            let own = &self.labels[at..at + width];
+            for axis in 0..3 {
+                let from = at + [1, width, self.ny * width][axis];
+                let in_plane = (row + 1) % self.ny != 0;
+                let Some(other) = self.labels.get(from..from + width - usize::from(axis == 0))
+                else {
+                    continue;
+                };
+                if axis == 1 && !in_plane {
+                    continue;
+                }
+                let to = &mut self.crossed[axis][row * stride..][..stride];
+                for ((a, b), to) in own.chunks(64).zip(other.chunks(64)).zip(to) {
+                    if a[..b.len()] != *b {
+                        for (i, (a, b)) in a.iter().zip(b).enumerate() {
+                            *to |= u64::from(a != b) << i;
+                        }
+                    }
+                }
+            }
+        }
+    }
+
+    /// The numbers of the labels at both ends of an edge that starts at voxel `[x, y, first + k]`.
+    #[inline]
+    pub(super) fn labels_at(&self, [x, y, k]: [usize; 3], axis: usize) -> Option<[u16; 2]> {
+        if self.labels.is_empty() {
+            return None;
+        }
+        let at = ((k + 1) * self.ny + y) * self.nx + x;
+        let step = [1, self.nx, self.ny * self.nx][axis];
+        Some([self.labels[at], self.labels[at + step]])
+    }
+
+    /// The numbers of the labels at the corners of a cell.
+    #[inline]
+    pub(super) fn labels_of_cell(&self, [x, y, k]: [usize; 3]) -> Option<[u16; 8]> {
+        if self.labels.is_empty() {
+            return None;
+        }
+        let at = ((k + 1) * self.ny + y) * self.nx + x;
+        let (row, plane) = (self.nx, self.ny * self.nx);
+        Some(std::array::from_fn(|c| {
+            self.labels[at + (c & 1) + (c >> 1 & 1) * row + (c >> 2) * plane]
+        }))
     }
 
     fn fill(&mut self, volume: &Volume, select: &Select) {
@@ -236,7 +378,7 @@ fn equal_bytes(row: &[u8], label: f64, to: &mut [u64]) {
 
 impl Select {
     /// Sets the bits of one slice; `out` is one slice deep.
-    fn read(&self, volume: &Volume, z: usize, out: &mut BitGrid) {
+    pub(super) fn read(&self, volume: &Volume, z: usize, out: &mut BitGrid) {
         let [nx, ny, _] = out.dims();
         with_samples!(&volume.data, v => {
             out.clear();

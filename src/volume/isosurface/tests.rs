@@ -86,3 +86,69 @@ fn links_hold(surface: &Surface, may_end: bool) {
         }
     }
 }
+
+#[test]
+fn labels_share_their_walls_and_leave_no_gap() {
+    let mut rng = Rng::new(11, 0);
+    for round in 0..40u32 {
+        let kinds = 2 + round as usize % 6;
+        let dims = [6, 7, 5 + round as usize % 9];
+        let values: Vec<u8> = (0..dims[0] * dims[1] * dims[2])
+            .map(|_| rng.below(kinds) as u8)
+            .collect();
+        let v = Volume {
+            frame: Frame::straight(dims, [0.0; 3], [1.0; 3]),
+            data: Data::U8(values.clone()),
+        };
+        let labels = Labels::new((1..kinds).map(|k| k as f64).collect());
+        let surface = extract_labels(&v, &labels, &Silent).expect("walls");
+        let positions = surface.positions(&v.frame, |_| [0.0; 3]);
+        let triangles = surface.triangles(&positions);
+        let mut whole = 0.0;
+        for label in 1..kinds {
+            let own = surface.triangles_around(label as u16, &triangles);
+            let mesh = Mesh::from_triangles(positions.clone(), own);
+            let report = topology(&mesh, &Silent).expect("a report");
+            assert_eq!(
+                report.boundary_edges.count, 0,
+                "round {round}, label {label}"
+            );
+            assert_eq!(
+                report.inconsistent_edges.count, 0,
+                "round {round}, label {label}"
+            );
+            whole += volume_of(&positions, &mesh.triangles);
+        }
+        // What all hold together is what the walls to the rest enclose.
+        let outer: Vec<_> = triangles
+            .iter()
+            .filter(|t| surface.sides_of(*t).expect("labels")[1] == 0)
+            .copied()
+            .collect();
+        let enclosed = volume_of(&positions, &outer);
+        assert!((whole - enclosed).abs() < 1e-9 * enclosed, "round {round}");
+    }
+}
+
+#[test]
+fn one_label_alone_is_cut_as_a_binary_volume() {
+    let mut rng = Rng::new(5, 0);
+    let values: Vec<u8> = (0..1000).map(|_| 3 * rng.below(2) as u8).collect();
+    let v = Volume {
+        frame: Frame::straight([10; 3], [0.0; 3], [1.0; 3]),
+        data: Data::U8(values),
+    };
+    let mut labels = extract_labels(&v, &Labels::new(vec![3.0]), &Silent).expect("walls");
+    let binary = extract(&v, &Select::Equal(3.0), Border::Closed, &Silent).expect("a surface");
+    assert!(labels.sides.iter().all(|s| *s == [1, 0]));
+    labels.sides.clear();
+    assert_eq!(labels, binary);
+}
+
+fn volume_of(positions: &[Vec3], triangles: &[[u32; 3]]) -> f64 {
+    let six = |t: &[u32; 3]| {
+        let [a, b, c] = t.map(|v| positions[v as usize]);
+        crate::numeric::vector::dot(a, crate::numeric::vector::cross(b, c))
+    };
+    triangles.iter().map(six).sum::<f64>() / 6.0
+}

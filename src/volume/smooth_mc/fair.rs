@@ -52,10 +52,10 @@ struct Weights {
 
 /// Encloses what is missing in each part, by moving it along its normals.
 pub(super) trait Inflate: Sync {
-    /// How far each part is to be moved outwards, in the unit of `offsets`, and the part of a vertex.
+    /// How far each part is to be moved outwards, in the unit of `offsets`.
     fn by(&self, offsets: &[f32x4]) -> Vec<f32>;
-    /// The part of a vertex.
-    fn part_of(&self, vertex: usize) -> usize;
+    /// How far a vertex is moved then.
+    fn shift(&self, vertex: usize, by: &[f32]) -> f32;
 }
 
 pub(super) struct Fair<'a> {
@@ -149,6 +149,22 @@ impl<'a> Fair<'a> {
         step + at[to] - at[vertex]
     }
 
+    /// The curves that end at a vertex without going on: the vertex that they come from, and its slot.
+    fn arms(&self, vertex: usize) -> impl Iterator<Item = (usize, usize)> {
+        let all: &[(u32, u32)] = if self.surface.is_on_edge(vertex) {
+            &[]
+        } else {
+            let of = |v: usize| {
+                self.surface
+                    .arms
+                    .partition_point(|arm| (arm.0 as usize) < v)
+            };
+            &self.surface.arms[of(vertex)..of(vertex + 1)]
+        };
+        all.iter()
+            .map(|arm| ((arm.1 >> 2) as usize, (arm.1 & 3) as usize))
+    }
+
     fn has(&self, vertex: usize, slot: usize) -> bool {
         self.surface.links[vertex][slot] != NONE
     }
@@ -195,6 +211,10 @@ impl<'a> Fair<'a> {
                         let row = weights[(link >> 2) as usize].row[(link >> 1 & 1) as usize];
                         diagonal += row * w.inverse[slot] * w.inverse[slot];
                     }
+                }
+                for (from, slot) in self.arms(v) {
+                    let arm = &weights[from];
+                    diagonal += arm.row[slot / 2] * arm.inverse[slot] * arm.inverse[slot];
                 }
                 if diagonal > 0.0 { STEP / diagonal } else { 0.0 }
             })
@@ -259,6 +279,10 @@ impl<'a> Fair<'a> {
                             gradient += bend * f32x4::splat(w.inverse[slot]);
                         }
                     }
+                    for (from, slot) in self.arms(v) {
+                        gradient +=
+                            bends[from][slot / 2] * f32x4::splat(weights[from].inverse[slot]);
+                    }
                     let wanted = *ahead - gradient * f32x4::splat(w.step);
                     let next = self.project(v, wanted);
                     let moved = next - *offset;
@@ -293,7 +317,7 @@ impl<'a> Fair<'a> {
                 for (i, at) in out.iter_mut().enumerate() {
                     let v = chunk * CHUNK + i;
                     let normal = self.normal(offsets, v);
-                    *at += normal * f32x4::splat(by[inflate.part_of(v)]);
+                    *at += normal * f32x4::splat(inflate.shift(v, &by));
                 }
             });
     }

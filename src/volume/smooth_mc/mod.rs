@@ -24,9 +24,11 @@ mod relax;
 mod tests;
 
 use crate::error::{Error, Result};
-use crate::numeric::vector::Vec3;
+use crate::numeric::sums::sum_by;
+use crate::numeric::vector::{Vec3, cross, dot, length, scale, sub};
 use crate::progress::Progress;
 use crate::trade::named;
+use crate::volume::isosurface::cases::step_of;
 use crate::volume::isosurface::{NONE, Surface, axis_of};
 use fair::Fair;
 use parts::Parts;
@@ -179,12 +181,20 @@ pub struct Stats {
     /// The longest way from a first place, in voxels: the sum along the axes, at most one half in the
     /// diamond.
     pub max_displacement: f64,
-    /// Parts that do not touch.
+    /// Parts that do not touch; where there are labels, the labels.
     pub components: u64,
     /// The parts, largest first; the smallest are left out where there are over 32.
     pub largest: Vec<Component>,
     /// Parts that keep less than a tenth of what marching cubes encloses.
     pub vanishing: u64,
+    /// Mean angle between chords of the curves in which the surface of marching cubes meets the planes of
+    /// voxel centres, in degrees.
+    pub turning_before_deg: f64,
+    /// The same of the smooth surface.
+    pub turning_after_deg: f64,
+    /// All parts, or where there are labels, all labels, that of the rest first.
+    #[serde(skip)]
+    pub parts: Vec<Component>,
     /// What the voxels hold, in voxels; null where the surface is open.
     pub voxels: Option<i64>,
     /// What marching cubes encloses, in voxels; null where the surface is open.
@@ -210,7 +220,6 @@ pub fn smooth(
     progress: &dyn Progress,
 ) -> Result<(Vec<Vec3>, Vec<[u32; 3]>, Stats)> {
     params.check()?;
-    let n = surface.len();
     let smallest = spacing.iter().copied().fold(f64::INFINITY, f64::min);
     let metric = spacing.map(|s| s / smallest);
     let regions = |vertex: usize| region(surface, vertex, params);
@@ -247,8 +256,12 @@ pub fn smooth(
         parts.fill(surface, &triangles, metric, &regions, &mut offsets);
     }
     let after = parts.enclosed_by(surface, &triangles, |v| offsets[v]);
-    let stats = stats(surface, params, &outcome, &offsets, &parts, &before, &after);
-    debug_assert_eq!(offsets.len(), n);
+    let turned = [
+        turning(surface, metric, |_| [0.0; 3]),
+        turning(surface, metric, |v| offsets[v]),
+    ];
+    let volumes = [&before, &after];
+    let stats = stats(surface, params, &outcome, &offsets, &parts, volumes, turned);
     Ok((offsets, triangles, stats))
 }
 
@@ -264,16 +277,48 @@ fn placed(surface: &Surface, metric: Vec3, offset: impl Fn(usize) -> Vec3 + Sync
         .collect()
 }
 
+/// Mean angle between one chord and the next of the curves in which a surface meets the planes of voxel
+/// centres, in degrees: what is left of the staircase, and what the shape itself turns.
+///
+/// `metric` is the spacing over the smallest one, `offset` in voxels. 0 where there is no curve.
+pub fn turning(surface: &Surface, metric: Vec3, offset: impl Fn(usize) -> Vec3 + Sync) -> f64 {
+    let chord = |v: usize, slot: usize| {
+        let step = step_of(surface.steps[v][slot]);
+        let d = sub(offset((surface.links[v][slot] >> 2) as usize), offset(v));
+        std::array::from_fn(|a| (0.5 * f64::from(step[a]) + d[a]) * metric[a])
+    };
+    let vertices: Vec<usize> = (0..surface.len()).collect();
+    let curves = |v: usize| (0..2).filter(move |c| !surface.links[v][2 * c..][..2].contains(&NONE));
+    let angles = sum_by(&vertices, |v| {
+        let angle = |c: usize| {
+            let (a, b): (Vec3, Vec3) = (scale(chord(*v, 2 * c), -1.0), chord(*v, 2 * c + 1));
+            length(cross(a, b)).atan2(dot(a, b))
+        };
+        curves(*v).map(angle).sum()
+    });
+    let count = sum_by(&vertices, |v| curves(*v).count() as f64);
+    if count > 0.0 {
+        (angles / count).to_degrees()
+    } else {
+        0.0
+    }
+}
+
 /// Where a vertex may go.
 fn region(surface: &Surface, vertex: usize, params: &Params) -> Region {
-    let axis = axis_of(surface.places[vertex]);
+    // One in the middle of a face or cell has no axis of its own, and is not thin.
+    let axis = axis_of(surface.places[vertex]) % 3;
     let links = surface.links[vertex];
     let mut fixed = [false; 3];
-    // Where a curve ends the surface does, in the plane across it.
-    for slot in 0..4 {
-        fixed[(axis + 1 + slot / 2) % 3] |= links[slot] == NONE;
-    }
     let mut reach = 0.5 * params.scale * (1.0 - STRICT);
+    if surface.is_on_edge(vertex) {
+        // Where a curve ends the surface does, in the plane across it.
+        for slot in 0..4 {
+            fixed[(axis + 1 + slot / 2) % 3] |= links[slot] == NONE;
+        }
+    } else if params.constraint == Constraint::CellEdge {
+        reach = 0.0;
+    }
     let mut inward = f64::INFINITY;
     if surface.thin[vertex] {
         match (params.thin, params.energy) {
@@ -304,8 +349,8 @@ fn stats(
     outcome: &Outcome,
     offsets: &[Vec3],
     parts: &Parts,
-    before: &[f64],
-    after: &[f64],
+    [before, after]: [&Vec<f64>; 2],
+    [turning_before_deg, turning_after_deg]: [f64; 2],
 ) -> Stats {
     let n = surface.len() as u64;
     let mut listed: Vec<Component> = (0..parts.len())
@@ -316,14 +361,23 @@ fn stats(
             volume_after: after[part],
         })
         .collect();
+    let all = listed.clone();
+    if !surface.sides.is_empty() {
+        // What is outside of all labels is none.
+        listed.remove(0);
+    }
     listed.sort_by_key(|c| std::cmp::Reverse(c.vertices));
+    let count = listed.len() as u64;
     let vanishing = listed
         .iter()
         .filter(|c| c.voxels.is_some() && c.volume_after.abs() < 0.1 * c.volume_before.abs())
         .count();
     listed.truncate(LISTED);
-    let closed = parts.voxels.iter().all(Option::is_some);
-    let sum = |of: &[f64]| closed.then(|| of.iter().sum());
+    let labels = usize::from(!surface.sides.is_empty());
+    let closed = parts.voxels[labels.min(parts.len())..]
+        .iter()
+        .all(Option::is_some);
+    let sum = |of: &[f64]| closed.then(|| of[labels.min(of.len())..].iter().sum());
     let way = |v: &Vec3| match params.constraint {
         Constraint::CellSize => v.iter().fold(0.0, |m: f64, c| m.max(c.abs())),
         _ => v.iter().map(|c| c.abs()).sum(),
@@ -333,12 +387,15 @@ fn stats(
         stop_reason: outcome.stop,
         max_step_last: outcome.last_step,
         awake_share: outcome.updates as f64 / (n * u64::from(outcome.iterations)).max(1) as f64,
-        boundary_vertices: surface.links.iter().filter(|l| l.contains(&NONE)).count() as u64,
+        boundary_vertices: surface.ends() as u64,
         thin_vertices: surface.thin.iter().filter(|t| **t).count() as u64,
         max_displacement: offsets.iter().map(way).fold(0.0, f64::max),
-        components: parts.len() as u64,
+        components: count,
         largest: listed,
         vanishing: vanishing as u64,
+        turning_before_deg,
+        turning_after_deg,
+        parts: all,
         voxels: closed.then(|| parts.voxels.iter().flatten().sum()),
         volume_before: sum(before),
         volume_after: sum(after),

@@ -22,7 +22,10 @@ const ROUNDS: usize = 12;
 
 /// The parts of a surface, numbered by their first vertices.
 pub(super) struct Parts {
+    /// The part of each vertex.
     of: Vec<u32>,
+    /// Where there are labels, which are the parts then, that on the other side; else empty.
+    outside: Vec<u32>,
     /// Vertices of each.
     pub sizes: Vec<u64>,
     /// Voxels within each, less those of a cavity; `None` for those that are open.
@@ -32,8 +35,12 @@ pub(super) struct Parts {
 }
 
 impl Parts {
-    /// Vertices of one polygon belong together. Cost: near linear.
+    /// Labels, that of the rest first; without them, vertices of one polygon belong together. Cost: near
+    /// linear.
     pub(super) fn find(surface: &Surface) -> Parts {
+        if !surface.sides.is_empty() {
+            return Parts::labels(surface);
+        }
         let mut parent: Vec<u32> = (0..surface.len() as u32).collect();
         fn root(parent: &mut [u32], mut v: u32) -> u32 {
             while parent[v as usize] != v {
@@ -57,6 +64,7 @@ impl Parts {
         }
         let mut parts = Parts {
             of: vec![0; surface.len()],
+            outside: Vec::new(),
             sizes: Vec::new(),
             voxels: Vec::new(),
             origins: Vec::new(),
@@ -75,11 +83,33 @@ impl Parts {
             parts.of[v] = part;
             let part = part as usize;
             parts.sizes[part] += 1;
-            if surface.links[v].contains(&NONE) {
+            if surface.is_on_edge(v) && surface.links[v].contains(&NONE) {
                 parts.voxels[part] = None;
             }
         }
         parts.count_voxels(surface);
+        parts
+    }
+
+    fn labels(surface: &Surface) -> Parts {
+        let side = |i: usize| surface.sides.iter().map(|s| u32::from(s[i])).collect();
+        let count = surface.sides.iter().map(|s| usize::from(s[0]) + 1).max();
+        let count = count.unwrap_or(0);
+        let mut parts = Parts {
+            of: side(0),
+            outside: side(1),
+            sizes: vec![0; count],
+            voxels: vec![Some(0); count],
+            origins: vec![surface.places.first().copied().unwrap_or_default(); count],
+        };
+        for sides in &surface.sides {
+            for side in sides {
+                parts.sizes[usize::from(*side)] += 1;
+            }
+        }
+        parts.count_voxels(surface);
+        // There is no end to what lies outside of all labels.
+        parts.voxels[0] = None;
         parts
     }
 
@@ -88,15 +118,25 @@ impl Parts {
     fn count_voxels(&mut self, surface: &Surface) {
         let mut doubled = vec![0i64; self.len()];
         for (v, place) in surface.places.iter().enumerate() {
-            if axis_of(*place) == 0 {
+            if surface.is_on_edge(v) && axis_of(*place) == 0 {
                 let part = self.of[v] as usize;
                 let from = i64::from(place[0]) - i64::from(self.origins[part][0]);
-                doubled[part] += if surface.lower_inside[v] { from } else { -from };
+                let signed = if surface.lower_inside[v] { from } else { -from };
+                doubled[part] += signed;
+                if let Some(other) = self.outside.get(v) {
+                    doubled[*other as usize] -= signed;
+                }
             }
         }
         for (voxels, doubled) in self.voxels.iter_mut().zip(doubled) {
             *voxels = voxels.map(|_| doubled / 2);
         }
+    }
+
+    /// The part inside of a vertex, and that outside.
+    fn sides(&self, vertex: usize) -> (usize, Option<usize>) {
+        let outside = self.outside.get(vertex).map(|part| *part as usize);
+        (self.of[vertex] as usize, outside)
     }
 
     pub(super) fn len(&self) -> usize {
@@ -261,7 +301,7 @@ struct Sums<'a> {
     surface: &'a Surface,
     metric: Vec3,
     all: BTreeMap<u32, Sum>,
-    current: u32,
+    current: (u32, Option<u32>),
     sum: Sum,
 }
 
@@ -272,16 +312,19 @@ impl<'a> Sums<'a> {
             surface,
             metric,
             all: BTreeMap::new(),
-            current: 0,
+            current: (0, None),
             sum: Sum::default(),
         }
     }
 
     fn add(&mut self, triangle: [u32; 3], offset: &impl Fn(usize) -> Vec3) {
-        let part = self.parts.of[triangle[0] as usize];
-        if part != self.current {
+        let (part, outside) = match self.surface.sides_of(&triangle) {
+            Some([inside, outside]) => (u32::from(inside), Some(u32::from(outside))),
+            None => (self.parts.of[triangle[0] as usize], None),
+        };
+        if (part, outside) != self.current {
             self.flush();
-            self.current = part;
+            self.current = (part, outside);
         }
         let origin = self.parts.origins[part as usize];
         let [a, b, c] = triangle.map(|v| {
@@ -299,9 +342,15 @@ impl<'a> Sums<'a> {
 
     fn flush(&mut self) {
         let sum = std::mem::take(&mut self.sum);
-        let all = self.all.entry(self.current).or_default();
+        let (inside, outside) = self.current;
+        let all = self.all.entry(inside).or_default();
         all.volume += sum.volume;
         all.area += sum.area;
+        if let Some(outside) = outside {
+            let all = self.all.entry(outside).or_default();
+            all.volume -= sum.volume;
+            all.area += sum.area;
+        }
     }
 
     fn done(mut self) -> BTreeMap<u32, Sum> {
@@ -328,7 +377,8 @@ impl Inflate for Target<'_> {
         by.into_iter().map(|b| b as f32).collect()
     }
 
-    fn part_of(&self, vertex: usize) -> usize {
-        self.parts.of[vertex] as usize
+    fn shift(&self, vertex: usize, by: &[f32]) -> f32 {
+        let (inside, outside) = self.parts.sides(vertex);
+        by[inside] - outside.map_or(0.0, |part| by[part])
     }
 }

@@ -31,7 +31,8 @@ impl<'a> Relax<'a> {
         regions: &'a (dyn Fn(usize) -> Region + Sync),
     ) -> Self {
         let n = surface.len();
-        let ends = |v: u32| surface.links[v as usize].contains(&NONE);
+        let ends =
+            |v: u32| surface.is_on_edge(v as usize) && surface.links[v as usize].contains(&NONE);
         let mut counts = vec![0u32; n + 1];
         for v in triangles.iter().flatten() {
             counts[*v as usize + 1] += 2;
