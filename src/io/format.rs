@@ -58,6 +58,8 @@ pub enum Format {
     Mhd,
     /// MetaImage in one file.
     Mha,
+    /// NIfTI-1 and NIfTI-2.
+    Nifti,
     /// NumPy array.
     Npy,
     /// binvox.
@@ -177,6 +179,13 @@ const TABLE: &[Row] = &[
         Kind::Volume,
         (true, true),
         "MetaImage in one file",
+    ),
+    row(
+        Format::Nifti,
+        &["nii"],
+        Kind::Volume,
+        (true, true),
+        "NIfTI-1 and NIfTI-2, in one file or a pair; written in one",
     ),
     row(
         Format::Npy,
@@ -365,6 +374,9 @@ pub fn sniff(bytes: &[u8], extension: Option<&str>) -> Result<Format, Fault> {
     }
     if bytes.starts_with(super::vdb::MAGIC) {
         return Ok(Format::Vdb);
+    }
+    if super::nifti::is_header(bytes) {
+        return Ok(Format::Nifti);
     }
     if by_name == Some(Format::Stl) || super::stl::is_binary(bytes) {
         return Ok(Format::Stl);

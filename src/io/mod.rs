@@ -3,7 +3,7 @@
 //! Readers keep what a file holds, in its order, and never repair. They refuse what a header
 //! claims but the bytes do not hold before they make room for it. A gzip layer is taken off
 //! whatever the file is called. Nothing outside the named file is read, but for the data file
-//! that a glTF, OBJ, NRRD or MetaImage header names in the same folder or below.
+//! that a glTF, OBJ, NRRD, MetaImage or NIfTI header names in the same folder or below.
 
 pub mod binvox;
 pub mod format;
@@ -11,6 +11,7 @@ pub mod gltf;
 mod header;
 pub mod json;
 pub mod metaimage;
+pub mod nifti;
 pub mod npy;
 pub mod nrrd;
 pub mod obj;
@@ -117,6 +118,7 @@ fn parse(source: &Source, format: Format, warnings: &mut Vec<Warning>) -> Result
         Format::Gltf | Format::Glb => Content::Mesh(gltf::read(source, warnings)?),
         Format::Nrrd => Content::Volume(nrrd::read(source, warnings)?),
         Format::Mhd | Format::Mha => Content::Volume(metaimage::read(source, warnings)?),
+        Format::Nifti => Content::Volume(nifti::read(source, warnings)?),
         Format::Npy => Content::Volume(npy::read(source, warnings)?),
         Format::Binvox => Content::Volume(binvox::read(source, warnings)?),
         Format::Svo => Content::Volume(svo::read(source, warnings)?),
@@ -147,6 +149,7 @@ pub fn companions(source: &Source, format: Option<Format>) -> Vec<PathBuf> {
     let names = match format.or_else(sniffed) {
         Some(Format::Nrrd) => nrrd::named_file(bytes).into_iter().collect(),
         Some(Format::Mhd | Format::Mha) => metaimage::named_file(bytes).into_iter().collect(),
+        Some(Format::Nifti) => nifti::named_file(source).into_iter().collect(),
         Some(Format::Gltf | Format::Glb) => gltf::named_files(bytes),
         _ => Vec::new(),
     };
@@ -240,6 +243,7 @@ pub fn write_volume(
         Format::Mhd => {
             return metaimage::write_pair(volume, sink).map(|outputs| (outputs, Vec::new()));
         }
+        Format::Nifti => nifti::write,
         Format::Npy => npy::write,
         Format::Binvox => binvox::write,
         Format::Vti => vti::write,
