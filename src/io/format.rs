@@ -205,8 +205,8 @@ const TABLE: &[Row] = &[
         Format::Vti,
         &["vti"],
         Kind::Volume,
-        (false, true),
-        "VTK image data in XML",
+        (true, true),
+        "VTK image data in XML, ascii, base64 and appended, with zlib or none; written appended",
     ),
     row(
         Format::Vdb,
@@ -392,6 +392,9 @@ pub fn sniff(bytes: &[u8], extension: Option<&str>) -> Result<Format, Fault> {
         return Ok(Format::Off);
     }
     let text = super::json::unmarked(text);
+    if super::vti::is_document(text) {
+        return Ok(Format::Vti);
+    }
     if text.starts_with(b"{") || text.starts_with(b"[") {
         let is_gltf = super::gltf::is_document(text);
         return Ok(if is_gltf { Format::Gltf } else { Format::Json });

@@ -5,6 +5,7 @@
 //! whatever the file is called. Nothing outside the named file is read, but for the data file
 //! that a glTF, OBJ, NRRD, MetaImage or NIfTI header names in the same folder or below.
 
+mod base64;
 pub mod binvox;
 pub mod format;
 pub mod gltf;
@@ -29,6 +30,7 @@ pub mod svo;
 mod text;
 pub mod vdb;
 pub mod vti;
+mod xml;
 
 #[cfg(test)]
 mod roundtrip;
@@ -122,13 +124,10 @@ fn parse(source: &Source, format: Format, warnings: &mut Vec<Warning>) -> Result
         Format::Npy => Content::Volume(npy::read(source, warnings)?),
         Format::Binvox => Content::Volume(binvox::read(source, warnings)?),
         Format::Svo => Content::Volume(svo::read(source, warnings)?),
+        Format::Vti => Content::Volume(vti::read(source, warnings)?),
         Format::Png => Content::Image(png::read(source)?),
         Format::Json => Content::Report(json::read(source, warnings)?),
-        Format::Vti | Format::Vdb => {
-            return Err(
-                Fault::whole(format!("{} files are written, not read", format.name())).into(),
-            );
-        }
+        Format::Vdb => return Err(Fault::whole("vdb files are written, not read").into()),
     };
     match &content {
         Content::Mesh(mesh) => mesh.check()?,

@@ -1,7 +1,7 @@
 //! Where a NIfTI header puts its samples.
 
 use super::header::{Header, PIXDIM, QFORM_CODE, QOFFSET, QUATERN, SFORM_CODE, SROW};
-use crate::error::Fault;
+use crate::error::{Fault, number};
 use crate::numeric::vector::{Vec3, add, dot, length, scale, sub};
 use crate::report::Warning;
 use crate::volume::Frame;
@@ -79,8 +79,8 @@ fn rotation(header: &Header, [b, c, d]: Vec3) -> Result<[Vec3; 3], Fault> {
         0.0
     } else if rest < 0.0 {
         let problem = format_args!(
-            "to quatern_d have the length {:?}, but in a rotation it is 1 at most",
-            square.sqrt()
+            "to quatern_d have the length {}, but in a rotation it is 1 at most",
+            number(square.sqrt())
         );
         return Err(header.fault(QUATERN, 0, problem));
     } else {
@@ -113,7 +113,7 @@ fn steps(header: &Header) -> Result<Vec3, Fault> {
         let index = axis + 1;
         *step = header.finite(PIXDIM, index)?;
         if *step < 0.0 {
-            let problem = format_args!("is {:?}, but a step is above 0", *step);
+            let problem = format!("is {}, but a step is above 0", number(*step));
             return Err(header.fault(PIXDIM, index, problem));
         }
         if *step == 0.0 && index > header.dimensions() {

@@ -1,6 +1,6 @@
 //! The header of a NIfTI file: two versions of one list of fields.
 
-use crate::error::Fault;
+use crate::error::{Fault, number};
 use crate::io::samples::{ByteOrder, SampleType};
 use crate::numeric::vector::Vec3;
 use crate::report::Warning;
@@ -298,7 +298,10 @@ impl<'a> Header<'a> {
             Version::One => {
                 let start = self.finite(VOX_OFFSET, 0)?;
                 if start.fract() != 0.0 {
-                    return fault(format!("is {start:?}, which is no whole number of bytes"));
+                    return fault(format!(
+                        "is {}, which is no whole number of bytes",
+                        number(start)
+                    ));
                 }
                 start as i64
             }

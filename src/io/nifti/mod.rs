@@ -20,7 +20,7 @@ mod header;
 
 use super::refusal::{RAISE, Refusal, expect_room};
 use super::samples::{self, ByteOrder, SampleType};
-use crate::error::{At, Fault};
+use crate::error::{At, Fault, number};
 use crate::io::source::Source;
 use crate::report::Warning;
 use crate::volume::{Data, Volume};
@@ -139,9 +139,9 @@ fn scaled(
         f64::MAX
     };
     let mut overflows = false;
-    let mut apply = |number: f64| {
-        let value = scaling.slope * number + scaling.intercept;
-        overflows |= number.is_finite() && value.abs() > largest;
+    let mut apply = |stored: f64| {
+        let value = scaling.slope * stored + scaling.intercept;
+        overflows |= stored.is_finite() && value.abs() > largest;
         value
     };
     let count = bytes.len() / sample.bytes();
@@ -162,9 +162,9 @@ fn scaled(
     };
     if overflows {
         return Err(scaling.fault(format!(
-            "scl_slope {:?} and scl_inter {:?} take samples out of the range of {}",
-            scaling.slope,
-            scaling.intercept,
+            "scl_slope {} and scl_inter {} take samples out of the range of {}",
+            number(scaling.slope),
+            number(scaling.intercept),
             data.sample_type()
         )));
     }

@@ -402,7 +402,7 @@ fn slope_and_intercept_scale_samples() {
     assert_eq!(single(0.1).read().unwrap().0.data, Data::F32(wanted));
     assert_eq!(
         single(1e38).refusal(),
-        "byte 112: scl_slope 9.999999680285692e37 and scl_inter 1.0 take samples out of the range of f32"
+        "byte 112: scl_slope 9.999999680285692e37 and scl_inter 1 take samples out of the range of f32"
     );
     assert_eq!(
         with(2.0, f64::NAN).refusal(),
@@ -529,7 +529,7 @@ fn frames_that_are_no_frames_are_named() {
     );
     check(
         turned([0.0, 3.0, 4.0], [0.0; 3]),
-        "byte 256: quatern_b to quatern_d have the length 5.0, but in a rotation it is 1 at most",
+        "byte 256: quatern_b to quatern_d have the length 5, but in a rotation it is 1 at most",
     );
     let steps = |y: f64| File {
         pixdim: [1.0, 1.0, y, 1.0, 0.0, 0.0, 0.0, 0.0],
@@ -537,7 +537,7 @@ fn frames_that_are_no_frames_are_named() {
     };
     check(
         steps(-2.0),
-        "byte 84: pixdim[2] is -2.0, but a step is above 0",
+        "byte 84: pixdim[2] is -2, but a step is above 0",
     );
     check(
         steps(f64::NAN),
