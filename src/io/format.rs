@@ -438,4 +438,22 @@ mod tests {
         }
         assert!(sniff(b"12", None).is_err());
     }
+
+    #[test]
+    fn nifti_and_vti_are_told_by_their_first_bytes() {
+        let mut nifti = vec![0; 348];
+        nifti[..2].copy_from_slice(&348u16.to_le_bytes());
+        nifti[344..].copy_from_slice(b"n+1\0");
+        let vti = b"\xef\xbb\xbf<?xml version=\"1.0\"?>\n<!-- a -->\n<VTKFile type=\"ImageData\">";
+        for extension in [None, Some("img"), Some("obj")] {
+            assert_eq!(sniff(&nifti, extension), Ok(Format::Nifti), "{extension:?}");
+        }
+        assert_eq!(sniff(vti, None), Ok(Format::Vti));
+        assert_eq!(sniff(&vti[3..], Some("xml")), Ok(Format::Vti));
+        // Without its magic it is whatever its name says.
+        nifti[344] = 0;
+        assert_eq!(sniff(&nifti, Some("nii")), Ok(Format::Nifti));
+        assert!(sniff(&nifti, None).is_err());
+        assert!(sniff(b"<svg>", None).is_err());
+    }
 }
