@@ -74,9 +74,9 @@ pub struct Args {
 }
 
 const AFTER: &str = "\
-The output is a volume (nrrd, mha, mhd, npy, binvox, vti, vdb, svo) or the faces of the set voxels
-as a mesh (obj, ply, stl, off, glb). The first measure of `accuracy`, which --max-error checks, is
-the largest distance from the centre of a set voxel to the model, in voxels.
+The output is a volume (nrrd, mha, mhd, nii, npy, binvox, vti, vdb, svo) or the faces of the set
+voxels as a mesh (obj, ply, stl, off, glb). The first measure of `accuracy`, which --max-error
+checks, is the largest distance from the centre of a set voxel to the model, in voxels.
 
 A point sets the voxel that holds it, a segment those it touches; both in conservative mode only.
 A triangle without area is met as the segment or point that it is.

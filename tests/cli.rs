@@ -131,7 +131,7 @@ fn every_reader_that_makes_more_than_it_may_ends_with_5() {
     plain.resize(plain.len() + (2 << 20), 0);
     place.put("plain.nrrd", plain);
     place.put("packed.ply.gz", packed(&vec![b' '; 2 << 20]));
-    for name in ["b.nrrd", "b.mha", "b.npy", "b.binvox"] {
+    for name in ["b.nrrd", "b.mha", "b.nii", "b.vti", "b.npy", "b.binvox"] {
         let line = format!("voxelize {CUBE} --resolution 254 --pad 1 -o {name} --report r.json -q");
         assert_eq!(place.run(&line).code, 0);
     }
@@ -143,6 +143,8 @@ fn every_reader_that_makes_more_than_it_may_ends_with_5() {
         "packed.ply.gz",
         "b.nrrd",
         "b.mha",
+        "b.nii",
+        "b.vti",
         "b.npy",
         "b.binvox",
         "fixtures/pictures/torus-knot.png",

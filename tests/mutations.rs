@@ -3,7 +3,7 @@
 //! The changes are random but the same on every run. One process reads all the variants of a file,
 //! so that a reader that panics, hangs or takes too much memory ends the test.
 
-use crate::support::{Workplace, packed};
+use crate::support::{Workplace, packed, root};
 use scantle::numeric::rng::Rng;
 use std::fs;
 
@@ -32,6 +32,18 @@ const MADE: &[(&str, &str)] = &[
     (
         "a.mhd",
         "voxelize fixtures/shapes/cube.obj --resolution 5 -o a.mhd",
+    ),
+    (
+        "a.nii",
+        "voxelize fixtures/shapes/cube.obj --resolution 5 -o a.nii",
+    ),
+    (
+        "b.nii",
+        "convert fixtures/volumes/nibabel-qform.nii -o b.nii",
+    ),
+    (
+        "a.vti",
+        "voxelize fixtures/shapes/cube.obj --resolution 5 -o a.vti",
     ),
     (
         "a.npy",
@@ -96,6 +108,15 @@ const WRITTEN: &[(&str, &str)] = &[
          ElementSpacing = 1 1 1\nDimSize = 2 3 2\nElementType = MET_SHORT\n\
          ElementDataFile = LOCAL\n1 2 3 4 5 6 7 8 9 10 11 12\n",
     ),
+];
+
+/// Files of other programs, below `fixtures/volumes/`.
+const FIXTURES: &[&str] = &[
+    "nibabel-qform.nii",
+    "nibabel-sform.nii.gz",
+    "vtk-inline-zlib.vti",
+    "vtk-base64.vti",
+    "vtk-raw-zlib.vti",
 ];
 
 /// Values that have broken readers: the ends of ranges, and numbers that are none.
@@ -214,6 +235,10 @@ fn damaged_files_are_read_or_refused() {
             .map(|(name, text)| (name.to_string(), text.as_bytes().to_vec())),
     );
     files.push(("packed.off.gz".to_owned(), packed(&files[5].1)));
+    for name in FIXTURES {
+        let path = root().join("fixtures/volumes").join(name);
+        files.push((name.to_string(), fs::read(path).expect("a fixture")));
+    }
     let mut total = [0; 2];
     for (seed, (name, bytes)) in (0..).zip(&files) {
         place.put(&format!("whole-{name}"), bytes);

@@ -1,6 +1,10 @@
 //! Voxels survive every way through the formats, and `compare` sees each one that does not.
 
-use crate::support::Workplace;
+use crate::support::{Workplace, root};
+use scantle::io::read_volume;
+use scantle::io::source::Source;
+use scantle::with_samples;
+use std::collections::BTreeMap;
 use std::fs;
 
 /// The names of the volume formats that are written and, where `read`, read too.
@@ -115,7 +119,7 @@ fn huge_and_empty() -> Vec<u8> {
 fn a_sparse_grid_too_large_to_expand_is_refused_where_the_format_is_dense() {
     let place = Workplace::new();
     place.put("huge.svo", huge_and_empty());
-    let dense = ["nrrd", "mha", "mhd", "npy", "binvox", "vti"];
+    let dense = ["nrrd", "mha", "mhd", "nii", "npy", "binvox", "vti"];
     for format in dense {
         let line = format!("convert huge.svo -o huge.{format} --max-memory 100MiB");
         let ran = place.run(&line);
@@ -143,4 +147,43 @@ fn numbers_other_than_0_and_1_are_no_bits() {
         assert!(ran.stderr.ends_with(why), "{}", ran.stderr);
     }
     assert!(place.names().is_empty());
+}
+
+#[test]
+fn files_of_nibabel_and_vtk_hold_what_those_find_in_them() {
+    let folder = root().join("fixtures/volumes");
+    let text = fs::read_to_string(folder.join("peers.json")).expect("the list");
+    let files: BTreeMap<String, Vec<[f64; 4]>> = serde_json::from_str(&text).expect("a list");
+    assert_eq!(files.len(), 9);
+    for (name, voxels) in files {
+        let path = folder.join(&name);
+        let source = Source::open(path.to_str().expect("a name"), u64::MAX).expect("a file");
+        let (volume, _, warnings) = read_volume(&source, None).expect(&name);
+        // The files of VTK have an array of vectors too.
+        let codes: Vec<_> = warnings.iter().map(|warning| &*warning.code).collect();
+        assert_eq!(
+            codes,
+            ["vti-arrays"][usize::from(!name.ends_with("vti"))..],
+            "{name}"
+        );
+        let frame = &volume.frame;
+        assert_eq!(frame.dims, [5, 4, 3], "{name}");
+        let values: Vec<f64> =
+            with_samples!(&volume.data, v => v.iter().map(|s| *s as f64).collect(), _ => vec![]);
+        assert_eq!(values.len(), voxels.len(), "{name}");
+        for (index, [place @ .., value]) in voxels.iter().enumerate() {
+            let steps = [index % 5, index / 5 % 4, index / 20].map(|i| i as f64);
+            for axis in 0..3 {
+                let moved: f64 = (0..3).map(|a| steps[a] * frame.axes[a][axis]).sum();
+                let apart = (frame.origin[axis] + moved - place[axis]).abs();
+                assert!(apart <= 1e-12, "{name}: voxel {index} is {apart} off");
+            }
+            let apart = (values[index] - value).abs();
+            assert!(
+                apart <= 1e-14,
+                "{name}: voxel {index} is {} not {value}",
+                values[index]
+            );
+        }
+    }
 }

@@ -58,6 +58,8 @@ pub enum Format {
     Mhd,
     /// MetaImage in one file.
     Mha,
+    /// NIfTI-1 and NIfTI-2.
+    Nifti,
     /// NumPy array.
     Npy,
     /// binvox.
@@ -179,6 +181,13 @@ const TABLE: &[Row] = &[
         "MetaImage in one file",
     ),
     row(
+        Format::Nifti,
+        &["nii"],
+        Kind::Volume,
+        (true, true),
+        "NIfTI-1 and NIfTI-2, in one file or a pair; written in one",
+    ),
+    row(
         Format::Npy,
         &["npy"],
         Kind::Volume,
@@ -196,8 +205,8 @@ const TABLE: &[Row] = &[
         Format::Vti,
         &["vti"],
         Kind::Volume,
-        (false, true),
-        "VTK image data in XML",
+        (true, true),
+        "VTK image data in XML, ascii, base64 and appended, with zlib or none; written appended",
     ),
     row(
         Format::Vdb,
@@ -366,6 +375,9 @@ pub fn sniff(bytes: &[u8], extension: Option<&str>) -> Result<Format, Fault> {
     if bytes.starts_with(super::vdb::MAGIC) {
         return Ok(Format::Vdb);
     }
+    if super::nifti::is_header(bytes) {
+        return Ok(Format::Nifti);
+    }
     if by_name == Some(Format::Stl) || super::stl::is_binary(bytes) {
         return Ok(Format::Stl);
     }
@@ -380,6 +392,9 @@ pub fn sniff(bytes: &[u8], extension: Option<&str>) -> Result<Format, Fault> {
         return Ok(Format::Off);
     }
     let text = super::json::unmarked(text);
+    if super::vti::is_document(text) {
+        return Ok(Format::Vti);
+    }
     if text.starts_with(b"{") || text.starts_with(b"[") {
         let is_gltf = super::gltf::is_document(text);
         return Ok(if is_gltf { Format::Gltf } else { Format::Json });
@@ -422,5 +437,23 @@ mod tests {
             assert_eq!(sniff(bytes, extension), Ok(format), "{extension:?}");
         }
         assert!(sniff(b"12", None).is_err());
+    }
+
+    #[test]
+    fn nifti_and_vti_are_told_by_their_first_bytes() {
+        let mut nifti = vec![0; 348];
+        nifti[..2].copy_from_slice(&348u16.to_le_bytes());
+        nifti[344..].copy_from_slice(b"n+1\0");
+        let vti = b"\xef\xbb\xbf<?xml version=\"1.0\"?>\n<!-- a -->\n<VTKFile type=\"ImageData\">";
+        for extension in [None, Some("img"), Some("obj")] {
+            assert_eq!(sniff(&nifti, extension), Ok(Format::Nifti), "{extension:?}");
+        }
+        assert_eq!(sniff(vti, None), Ok(Format::Vti));
+        assert_eq!(sniff(&vti[3..], Some("xml")), Ok(Format::Vti));
+        // Without its magic it is whatever its name says.
+        nifti[344] = 0;
+        assert_eq!(sniff(&nifti, Some("nii")), Ok(Format::Nifti));
+        assert!(sniff(&nifti, None).is_err());
+        assert!(sniff(b"<svg>", None).is_err());
     }
 }

@@ -3,14 +3,16 @@
 //! Readers keep what a file holds, in its order, and never repair. They refuse what a header
 //! claims but the bytes do not hold before they make room for it. A gzip layer is taken off
 //! whatever the file is called. Nothing outside the named file is read, but for the data file
-//! that a glTF, OBJ, NRRD or MetaImage header names in the same folder or below.
+//! that a glTF, OBJ, NRRD, MetaImage or NIfTI header names in the same folder or below.
 
+mod base64;
 pub mod binvox;
 pub mod format;
 pub mod gltf;
 mod header;
 pub mod json;
 pub mod metaimage;
+pub mod nifti;
 pub mod npy;
 pub mod nrrd;
 pub mod obj;
@@ -28,6 +30,7 @@ pub mod svo;
 mod text;
 pub mod vdb;
 pub mod vti;
+mod xml;
 
 #[cfg(test)]
 mod roundtrip;
@@ -117,16 +120,14 @@ fn parse(source: &Source, format: Format, warnings: &mut Vec<Warning>) -> Result
         Format::Gltf | Format::Glb => Content::Mesh(gltf::read(source, warnings)?),
         Format::Nrrd => Content::Volume(nrrd::read(source, warnings)?),
         Format::Mhd | Format::Mha => Content::Volume(metaimage::read(source, warnings)?),
+        Format::Nifti => Content::Volume(nifti::read(source, warnings)?),
         Format::Npy => Content::Volume(npy::read(source, warnings)?),
         Format::Binvox => Content::Volume(binvox::read(source, warnings)?),
         Format::Svo => Content::Volume(svo::read(source, warnings)?),
+        Format::Vti => Content::Volume(vti::read(source, warnings)?),
         Format::Png => Content::Image(png::read(source)?),
         Format::Json => Content::Report(json::read(source, warnings)?),
-        Format::Vti | Format::Vdb => {
-            return Err(
-                Fault::whole(format!("{} files are written, not read", format.name())).into(),
-            );
-        }
+        Format::Vdb => return Err(Fault::whole("vdb files are written, not read").into()),
     };
     match &content {
         Content::Mesh(mesh) => mesh.check()?,
@@ -147,6 +148,7 @@ pub fn companions(source: &Source, format: Option<Format>) -> Vec<PathBuf> {
     let names = match format.or_else(sniffed) {
         Some(Format::Nrrd) => nrrd::named_file(bytes).into_iter().collect(),
         Some(Format::Mhd | Format::Mha) => metaimage::named_file(bytes).into_iter().collect(),
+        Some(Format::Nifti) => nifti::named_file(source).into_iter().collect(),
         Some(Format::Gltf | Format::Glb) => gltf::named_files(bytes),
         _ => Vec::new(),
     };
@@ -240,6 +242,7 @@ pub fn write_volume(
         Format::Mhd => {
             return metaimage::write_pair(volume, sink).map(|outputs| (outputs, Vec::new()));
         }
+        Format::Nifti => nifti::write,
         Format::Npy => npy::write,
         Format::Binvox => binvox::write,
         Format::Vti => vti::write,

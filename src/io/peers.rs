@@ -89,6 +89,7 @@ fn write_files_for_peers() {
         Format::Nrrd,
         Format::Mha,
         Format::Mhd,
+        Format::Nifti,
         Format::Npy,
         Format::Vti,
     ];
@@ -163,9 +164,10 @@ fn sparse_and_dense_volumes_are_written_alike() {
             frame: dense.frame,
             data: Data::Sparse(Octree::from_bits(grid)),
         };
-        let writers: [Writer; 6] = [
+        let writers: [Writer; 7] = [
             super::nrrd::write,
             super::metaimage::write,
+            super::nifti::write,
             super::npy::write,
             super::vti::write,
             super::vdb::write,

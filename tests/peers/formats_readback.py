@@ -5,7 +5,7 @@
     SCANTLE_PEERS=DIR cargo test --lib write_files_for_peers -- --ignored
     python3 tests/peers/formats_readback.py DIR
 
-Needs numpy, pynrrd, SimpleITK, pyvista (with vtk) and trimesh. Writes nothing; not run in CI.
+Needs nibabel, numpy, pynrrd, SimpleITK, pyvista (with vtk) and trimesh. Writes nothing; not run in CI.
 OpenVDB has a script of its own, openvdb_readback.py.
 """
 
@@ -13,6 +13,7 @@ import json
 import pathlib
 import sys
 
+import nibabel
 import nrrd
 import numpy as np
 import pyvista
@@ -71,6 +72,14 @@ def with_itk(reference, path):
         same(f"{path} voxel {index}", found, wanted, 1e-6)
 
 
+def with_nibabel(reference, path):
+    image = nibabel.load(path)
+    values = np.asanyarray(image.dataobj)  # indexed x, y, z
+    check(path, np.array_equal(values.transpose(2, 1, 0), reference.values))
+    same(path, image.affine[:3, :3], reference.axes.T)
+    same(path, image.affine[:3, 3], reference.origin)
+
+
 def with_numpy(reference, path):
     values = np.load(path)
     check(path, np.array_equal(values, reference.values))
@@ -118,6 +127,7 @@ PEERS = [
     ("nrrd", with_itk),
     ("mha", with_itk),
     ("mhd", with_itk),
+    ("nii", with_nibabel),
     ("npy", with_numpy),
     ("vti", with_pyvista),
     ("binvox", with_trimesh),
@@ -137,6 +147,6 @@ if not references:
 print(
     f"{checks} comparisons hold:",
     f"pynrrd {nrrd.__version__}, SimpleITK {SimpleITK.Version_VersionString()},",
-    f"numpy {np.__version__}, pyvista {pyvista.__version__}, vtk {vtk.VTK_VERSION},",
+    f"nibabel {nibabel.__version__}, numpy {np.__version__}, pyvista {pyvista.__version__}, vtk {vtk.VTK_VERSION},",
     f"trimesh {trimesh.__version__}",
 )

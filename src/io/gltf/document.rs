@@ -1,6 +1,7 @@
 //! The parts of a glTF document that hold geometry, its container and its buffers.
 
 use crate::error::Fault;
+use crate::io::base64;
 use crate::io::header::excerpt;
 use crate::io::refusal::Refusal;
 use crate::io::samples::warn_trailing;
@@ -366,39 +367,9 @@ impl<'a> Buffers<'a> {
 /// The bytes of a `data:` URI, which must be base64.
 fn data_uri(uri: &str) -> Result<Vec<u8>, String> {
     match uri.split_once(',') {
-        Some((head, text)) if head.ends_with(";base64") => base64(text),
+        Some((head, text)) if head.ends_with(";base64") => base64::decode(text),
         _ => Err(format!("the URI {:?} is not base64", excerpt(uri))),
     }
-}
-
-/// Decodes base64 (RFC 4648, section 4); padding may be left out.
-fn base64(text: &str) -> Result<Vec<u8>, String> {
-    let digits = text.trim_end_matches('=').as_bytes();
-    let mut bytes = Vec::with_capacity(digits.len() / 4 * 3 + 2);
-    for (block, four) in digits.chunks(4).enumerate() {
-        let mut bits = 0u32;
-        for (i, digit) in four.iter().enumerate() {
-            let value = match digit {
-                b'A'..=b'Z' => digit - b'A',
-                b'a'..=b'z' => digit - b'a' + 26,
-                b'0'..=b'9' => digit - b'0' + 52,
-                b'+' => 62,
-                b'/' => 63,
-                _ => {
-                    return Err(format!(
-                        "character {} of its base64 data is no base64 digit",
-                        4 * block + i
-                    ));
-                }
-            };
-            bits |= u32::from(value) << (18 - 6 * i);
-        }
-        if four.len() == 1 {
-            return Err("its base64 data ends within a byte".into());
-        }
-        bytes.extend(&bits.to_be_bytes()[1..four.len()]);
-    }
-    Ok(bytes)
 }
 
 /// A URI with each `%41` as the byte it stands for.
@@ -425,44 +396,9 @@ fn percent_decoded(uri: &str) -> Result<String, String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use proptest::prelude::*;
-
-    /// Encodes base64 in the plain way, for the round trip.
-    fn encoded(bytes: &[u8]) -> String {
-        const DIGITS: &[u8; 64] =
-            b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-        let mut text = String::new();
-        for three in bytes.chunks(3) {
-            let bits = three
-                .iter()
-                .enumerate()
-                .fold(0u32, |w, (i, b)| w | u32::from(*b) << (16 - 8 * i));
-            for i in 0..=three.len() {
-                text.push(char::from(DIGITS[(bits >> (18 - 6 * i) & 63) as usize]));
-            }
-            text.push_str(&"=".repeat(3 - three.len()));
-        }
-        text
-    }
-
-    proptest! {
-        #[test]
-        fn base64_comes_back(bytes in prop::collection::vec(any::<u8>(), 0..40)) {
-            prop_assert_eq!(base64(&encoded(&bytes)).unwrap(), bytes);
-        }
-    }
 
     #[test]
-    fn base64_and_uris_that_are_none_are_named() {
-        assert_eq!(base64("Zm9vYg").unwrap(), b"foob");
-        assert_eq!(
-            base64("Zm9v!").unwrap_err(),
-            "character 4 of its base64 data is no base64 digit"
-        );
-        assert_eq!(
-            base64("Zm9vY").unwrap_err(),
-            "its base64 data ends within a byte"
-        );
+    fn uris_that_are_none_are_named() {
         assert_eq!(percent_decoded("a%20b%zz%C3%A9").unwrap(), "a b%zzé");
         assert!(percent_decoded("%ff").is_err());
         assert!(data_uri("data:text/plain,hello").is_err());
