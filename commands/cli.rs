@@ -4,8 +4,8 @@ use crate::exit::Exit;
 use crate::streams::say;
 use crate::trade::{Declared, TABLE};
 use crate::{
-    compare, completions, convert, formats, info, man, schema, shadow, stability, tradeoff,
-    voxelize,
+    compare, completions, convert, formats, info, isosurface, man, schema, shadow, smooth_mc,
+    stability, tradeoff, voxelize,
 };
 use clap::error::ErrorKind;
 use clap::{Arg, CommandFactory, FromArgMatches, Parser, Subcommand};
@@ -28,6 +28,8 @@ struct Cli {
 pub enum Command {
     Voxelize(Box<voxelize::Args>),
     Shadow(Box<shadow::Args>),
+    SmoothMc(Box<smooth_mc::Args>),
+    Isosurface(isosurface::Args),
     Info(info::Args),
     Compare(compare::Args),
     Convert(convert::Args),
@@ -43,6 +45,7 @@ pub enum Command {
 const GROUPS: &[(&str, &[&str])] = &[
     ("Mesh to volume", &["voxelize"]),
     ("Mesh to picture", &["shadow"]),
+    ("Volume to mesh", &["smooth-mc", "isosurface"]),
     ("Any file", &["info", "convert", "compare"]),
     ("Any command", &["tradeoff", "stability"]),
     (

@@ -30,6 +30,7 @@ pub struct Files<'a> {
     together: bool,
     output: Option<&'a Output>,
     preview: Option<&'a Preview>,
+    labelled: bool,
 }
 
 impl<'a> Files<'a> {
@@ -49,12 +50,19 @@ impl<'a> Files<'a> {
             together: true,
             output: None,
             preview: None,
+            labelled: false,
         }
     }
 
     /// With a result that is written where the user says.
     pub fn output(mut self, output: &'a Output) -> Self {
         self.output = Some(output);
+        self
+    }
+
+    /// With several results of one input, one for each label, where the place has `{label}`.
+    pub fn labelled(mut self, labelled: bool) -> Self {
+        self.labelled = labelled;
         self
     }
 
@@ -85,7 +93,13 @@ impl<'a> Files<'a> {
         else {
             return Ok(None);
         };
-        let planned = destination::plan("output", word, asked.map(Format::name), &self.names())?;
+        let planned = destination::plan(
+            "output",
+            word,
+            asked.map(Format::name),
+            &self.names(),
+            self.labelled,
+        )?;
         planned
             .into_iter()
             .map(|place| {
@@ -109,7 +123,8 @@ impl<'a> Files<'a> {
                 "a picture goes to a file, not to standard output",
             )),
             Some(word) => {
-                let planned = destination::plan("preview", word, Some("png"), &self.names())?;
+                let planned =
+                    destination::plan("preview", word, Some("png"), &self.names(), false)?;
                 planned
                     .iter()
                     .try_for_each(|place| check_preview(word, &place.sink))?;

@@ -97,10 +97,11 @@ pub fn plan(
     word: &str,
     extension: Option<&str>,
     inputs: &[String],
+    labelled: bool,
 ) -> Result<Vec<Destination>> {
     let wrong = |problem: String| Error::parameter(option, word, problem);
     let is_folder = word.ends_with('/') || Path::new(word).is_dir();
-    check_placeholders(word).map_err(wrong)?;
+    check_placeholders(word, labelled).map_err(wrong)?;
     if inputs.len() > 1 && !is_folder && !word.contains("{stem}") {
         return Err(wrong(format!(
             "one place for the results of {} inputs; name a folder (out/) or use {{stem}}",
@@ -131,12 +132,13 @@ pub fn plan(
     Ok(planned)
 }
 
-fn check_placeholders(word: &str) -> Result<(), String> {
+fn check_placeholders(word: &str, labelled: bool) -> Result<(), String> {
     for part in word.split('{').skip(1) {
         let name = part.split_once('}').map(|(name, _)| name);
-        if name != Some("stem") {
+        if name != Some("stem") && !(labelled && name == Some("label")) {
+            let also = if labelled { " and {label}" } else { "" };
             return Err(format!(
-                "{{{} is no placeholder here; there is {{stem}}",
+                "{{{} is no placeholder here; there is {{stem}}{also}",
                 name.map_or(part.to_owned(), |name| format!("{name}}}"))
             ));
         }
@@ -295,7 +297,7 @@ mod tests {
 
     fn paths(word: &str, extension: Option<&str>, inputs: &[&str]) -> Result<Vec<String>> {
         let inputs: Vec<String> = inputs.iter().map(|s| s.to_string()).collect();
-        let planned = plan("output", word, extension, &inputs)?;
+        let planned = plan("output", word, extension, &inputs, false)?;
         Ok(planned
             .iter()
             .map(|p| p.sink.path().display().to_string())

@@ -22,6 +22,9 @@ use scantle::volume::Volume;
 use serde::Serialize;
 use serde_json::Value;
 
+/// What stands for the label in the place of a result.
+const LABEL: &str = "{label}";
+
 /// What a command found: the part of the report that is its own.
 pub struct Found<P, R> {
     parameters: P,
@@ -235,6 +238,24 @@ impl<'a> Job<'a> {
     /// Writes the result, if the user wants it.
     pub fn write_mesh(&mut self, mesh: &Mesh) -> Result<()> {
         self.write_with(|sink, format| io::write_mesh(mesh, sink, format))
+    }
+
+    /// Whether the result is a file for each label.
+    pub fn takes_labels(&self) -> bool {
+        let path = self.output.as_ref().map(|target| target.place.sink.path());
+        path.is_some_and(|path| path.display().to_string().contains(LABEL))
+    }
+
+    /// Writes the result of one label, where there is a file for each.
+    pub fn write_labelled(&mut self, label: &str, mesh: &Mesh) -> Result<()> {
+        let all = self.output.clone();
+        if let Some(target) = &mut self.output {
+            let path = target.place.sink.path().display().to_string();
+            target.place.sink = Sink::new(&path.replace(LABEL, label));
+        }
+        let written = self.write_mesh(mesh);
+        self.output = all;
+        written
     }
 
     /// Writes the result, if the user wants it.

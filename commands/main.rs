@@ -24,9 +24,11 @@ mod completions;
 mod convert;
 mod formats;
 mod info;
+mod isosurface;
 mod man;
 mod schema;
 mod shadow;
+mod smooth_mc;
 mod stability;
 mod tradeoff;
 mod voxelize;
@@ -47,6 +49,8 @@ fn run(command: &Command) -> Exit {
     let ended = match command {
         Command::Voxelize(args) => voxelize::run(args),
         Command::Shadow(args) => shadow::run(args),
+        Command::SmoothMc(args) => smooth_mc::run(args),
+        Command::Isosurface(args) => isosurface::run(args),
         Command::Info(args) => info::run(args),
         Command::Compare(args) => compare::run(args),
         Command::Convert(args) => convert::run(args),

@@ -2,7 +2,10 @@
 
 use crate::exit::Exit;
 use crate::streams::print;
-use crate::{compare, convert, formats, info, shadow, stability, tradeoff, voxelize, words};
+use crate::{
+    compare, convert, formats, info, isosurface, shadow, smooth_mc, stability, tradeoff, voxelize,
+    words,
+};
 use clap::builder::PossibleValuesParser;
 use scantle::error::Result;
 use scantle::report::Report;
@@ -33,7 +36,9 @@ const SCHEMAS: &[Row] = &[
     ("convert", || schema_for!(convert::Report)),
     ("formats", || schema_for!(formats::Table)),
     ("info", || schema_for!(info::Report)),
+    ("isosurface", || schema_for!(isosurface::Report)),
     ("shadow", || schema_for!(shadow::Report)),
+    ("smooth-mc", || schema_for!(smooth_mc::Report)),
     ("stability", || schema_for!(stability::Report)),
     ("tradeoff", || schema_for!(tradeoff::Report)),
     ("voxelize", || schema_for!(voxelize::Report)),

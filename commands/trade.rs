@@ -2,7 +2,7 @@
 
 use scantle::render::shadow;
 use scantle::trade::Trade;
-use scantle::volume::voxelize;
+use scantle::volume::{smooth_mc, voxelize};
 
 /// What a command says about its trade.
 pub enum Declared {
@@ -38,6 +38,11 @@ impl Declared {
 pub const TABLE: &[(&str, Declared)] = &[
     ("voxelize", Declared::Trade(&voxelize::TRADE)),
     ("shadow", Declared::Trade(&shadow::TRADE)),
+    ("smooth-mc", Declared::Trade(&smooth_mc::TRADE)),
+    (
+        "isosurface",
+        Declared::None("its vertices lie where linear interpolation meets the level"),
+    ),
     (
         "compare",
         Declared::None(

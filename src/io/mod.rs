@@ -334,6 +334,13 @@ fn dropped(mesh: &Mesh, format: Format) -> Vec<Warning> {
             mesh.colors.as_ref().map_or(0, Vec::len),
         );
     }
+    if format != Format::Ply {
+        note(
+            "dropped-labels",
+            "labels of faces",
+            mesh.sides.as_ref().map_or(0, Vec::len),
+        );
+    }
     if !holds.segments {
         note("dropped-segments", "polylines", mesh.segments.len());
     }

@@ -66,10 +66,8 @@ pub fn measure(
 ) -> Result<SmoothError> {
     let smallest = spacing.iter().copied().fold(f64::INFINITY, f64::min);
     let metric = spacing.map(|s| s / smallest);
-    let in_voxels = lattice_mesh(surface, [1.0; 3], offsets, triangles);
-    progress.stage("voxelize", 0);
     let misclassified_voxels = inside
-        .map(|inside| on_wrong_side(inside, &in_voxels, max_memory, progress))
+        .map(|inside| misclassified(surface, inside, offsets, triangles, max_memory, progress))
         .transpose()?;
     progress.stage("distance", 0);
     let (hausdorff, hausdorff_bound) = if triangles.is_empty() {
@@ -108,6 +106,20 @@ pub fn measure(
         from_fairest,
         fairest_turning_deg: turning(surface, metric, |v| best[v]),
     })
+}
+
+/// Number of voxels whose centres these triangles, which close, have on another side than they belong.
+pub fn misclassified(
+    surface: &Surface,
+    inside: &BitGrid,
+    offsets: &[Vec3],
+    triangles: &[[u32; 3]],
+    max_memory: u64,
+    progress: &dyn Progress,
+) -> Result<u64> {
+    progress.stage("voxelize", 0);
+    let in_voxels = lattice_mesh(surface, [1.0; 3], offsets, triangles);
+    on_wrong_side(inside, &in_voxels, max_memory, progress)
 }
 
 fn normals(mesh: &Mesh) -> Vec<Vec3> {

@@ -31,6 +31,8 @@ pub struct Mesh {
     pub points: Vec<u32>,
     /// One unit normal per vertex.
     pub normals: Option<Vec<Vec3>>,
+    /// The labels inside and outside of each triangle, for walls between bodies.
+    pub sides: Option<Vec<[i32; 2]>>,
     /// One colour per vertex: red, green, blue, alpha from 0 to 1, as stored.
     pub colors: Option<Vec<[f32; 4]>>,
 }
@@ -71,6 +73,23 @@ impl Mesh {
             triangles,
             ..Mesh::default()
         }
+    }
+
+    /// The triangles with only the vertices that they use, in their order.
+    pub fn compacted(&self) -> Mesh {
+        let mut number = vec![u32::MAX; self.positions.len()];
+        for v in self.triangles.iter().flatten() {
+            number[*v as usize] = 0;
+        }
+        let mut positions = Vec::new();
+        for (v, number) in number.iter_mut().enumerate() {
+            if *number == 0 {
+                *number = positions.len() as u32;
+                positions.push(self.positions[v]);
+            }
+        }
+        let triangles = self.triangles.iter().map(|t| t.map(|v| number[v as usize]));
+        Mesh::from_triangles(positions, triangles.collect())
     }
 
     /// Number of faces as stored.

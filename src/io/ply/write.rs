@@ -37,7 +37,14 @@ pub fn write(mesh: &Mesh, out: &mut dyn Write) -> io::Result<()> {
         None => mesh
             .triangles
             .iter()
-            .try_for_each(|face| out.face(face, false))?,
+            .enumerate()
+            .try_for_each(|(t, face)| {
+                out.face(face, false)?;
+                match &mesh.sides {
+                    Some(sides) => out.indices(&sides[t].map(|s| s as u32)),
+                    None => Ok(()),
+                }
+            })?,
     }
     for segment in &mesh.segments {
         out.indices(segment)?;
@@ -114,6 +121,10 @@ impl Plan {
             let count = if self.long_faces { "uint" } else { "uchar" };
             lines.push(format!("element face {}", mesh.face_count()));
             lines.push(format!("property list {count} {index} vertex_indices"));
+            if mesh.sides.is_some() && mesh.polygons.is_none() {
+                lines.push("property int label".to_owned());
+                lines.push("property int label_outside".to_owned());
+            }
         }
         if !mesh.segments.is_empty() {
             lines.push(format!("element edge {}", mesh.segments.len()));

@@ -128,6 +128,13 @@ impl Surface {
         self.places.len()
     }
 
+    /// Bytes that it takes.
+    pub fn bytes(&self) -> u64 {
+        let each = 12 + 2 + 16 + 4 + if self.sides.is_empty() { 0 } else { 4 };
+        let loops = self.loops.lengths.len() + 4 * self.loops.corners.len();
+        (each * self.len() + loops + 8 * self.arms.len()) as u64
+    }
+
     /// Number of vertices where the surface ends.
     pub fn ends(&self) -> usize {
         let ends = |v: &usize| self.is_on_edge(*v) && self.links[*v].contains(&NONE);
@@ -589,6 +596,30 @@ pub fn at_level(volume: &Volume, surface: &Surface, level: f64) -> Vec<f64> {
         .with_min_len(1 << 12)
         .map(|place| meets(place).unwrap_or(0.0))
         .collect()
+}
+
+/// The different values of a volume, ascending; `None` where there are more than `most`, or one is no
+/// number. Cost: one pass.
+pub fn values(volume: &Volume, most: usize) -> Option<Vec<f64>> {
+    let mut found: Vec<f64> = Vec::new();
+    let mut last = f64::NAN;
+    let mut add = |value: f64| {
+        if value == last {
+            return true;
+        }
+        last = value;
+        match found.binary_search_by(|v| v.total_cmp(&value)) {
+            Ok(_) => true,
+            Err(at) => {
+                found.insert(at, value);
+                found.len() <= most && !value.is_nan()
+            }
+        }
+    };
+    let all = with_samples!(&volume.data, v => v.iter().all(|value| add(*value as f64)), _ => {
+        add(0.0) && add(1.0)
+    });
+    all.then_some(found)
 }
 
 /// What is inside, as bits.

@@ -22,6 +22,7 @@ pub mod region;
 mod relax;
 #[cfg(test)]
 mod tests;
+mod trade;
 
 use crate::error::{Error, Result};
 use crate::numeric::sums::sum_by;
@@ -37,6 +38,7 @@ use region::{Constraint, Region, STRICT};
 use relax::Relax;
 use schemars::JsonSchema;
 use serde::Serialize;
+pub use trade::TRADE;
 
 /// What is made small.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
