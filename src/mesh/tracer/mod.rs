@@ -65,7 +65,7 @@ impl Tracer {
     /// ([`Mesh::check`]), and it has fewer than 2^31 triangles.
     ///
     /// Vertices of no triangle have no influence. The same layout comes from any number of
-    /// threads. Cost: O(n log n) time and about 80 bytes per triangle.
+    /// threads. Cost: O(n log n) time and about 75 bytes per triangle.
     pub fn new(mesh: &Mesh) -> Self {
         let bounds = bounds_of_triangles(mesh);
         let frame = LocalFrame::around(bounds);

@@ -1,16 +1,16 @@
-//! Building the tree: binned splits by surface area, eight children a node.
+//! Building the tree: binned splits by surface area, two children at a time.
 
-use super::{IS_LEAF, LEAF, Lanes, Leaf, NONE, Node, WIDTH, WideBvh};
+use super::collapse::{Twig, collapse};
+use super::{IS_LEAF, LEAF, Leaf, NONE, Node, WideBvh};
 use crate::spatial::aabb::Aabb;
 use rayon::prelude::*;
-use std::ops::Range;
 use wide::f32x4;
 
 /// Most candidate planes of a split, plus one.
 const BINS: usize = 16;
 /// From this depth on parts are halved by count.
 const SPLIT_DEPTH: u32 = 64;
-/// Items below which a node is made by one thread.
+/// Items below which a subtree is made by one thread.
 const PARALLEL: usize = 1 << 13;
 /// Items per parallel step; fixed, so that nothing follows the number of threads.
 const CHUNK: usize = 1 << 14;
@@ -19,9 +19,9 @@ const NARROW: f32 = 1e-30;
 
 /// A box; the fourth lane says nothing.
 #[derive(Debug, Clone, Copy)]
-struct Extent {
-    lo: f32x4,
-    hi: f32x4,
+pub(super) struct Extent {
+    pub lo: f32x4,
+    pub hi: f32x4,
 }
 
 impl Extent {
@@ -44,7 +44,7 @@ impl Extent {
     }
 
     #[inline(always)]
-    fn half_area(self) -> f32 {
+    pub fn half_area(self) -> f32 {
         let [x, y, z, _] = (self.hi - self.lo).to_array();
         x * y + y * z + z * x
     }
@@ -129,13 +129,6 @@ impl Bounds {
     }
 }
 
-/// Entries that become one child.
-#[derive(Clone)]
-struct Part {
-    range: Range<usize>,
-    bounds: Bounds,
-}
-
 pub(super) fn build(count: u32, bounds: impl Fn(u32) -> Aabb + Sync) -> (WideBvh, Vec<Leaf>) {
     let mut entries: Vec<Entry> = (0..count)
         .into_par_iter()
@@ -144,25 +137,22 @@ pub(super) fn build(count: u32, bounds: impl Fn(u32) -> Aabb + Sync) -> (WideBvh
     if entries.par_iter().any(Entry::is_empty) {
         entries.retain(|entry| !entry.is_empty());
     }
-    let mut nodes = Vec::new();
+    let mut twigs = Vec::new();
     if !entries.is_empty() {
         let whole = Bounds::of(&entries);
-        grow(&mut entries, 0, whole, 0, &mut nodes);
+        grow(&mut entries, 0, whole, 0, &mut twigs);
     }
+    let mut nodes = collapse(&twigs);
     let leaves = number(&mut nodes, &entries);
     (WideBvh { nodes }, leaves)
 }
 
-/// Turns links that count from a node into indices of nodes, and places of entries into numbers of
-/// leaves.
+/// Turns places of entries into numbers of leaves.
 fn number(nodes: &mut [Node], entries: &[Entry]) -> Vec<Leaf> {
     let mut leaves = Vec::with_capacity(entries.len() / 2);
-    for (at, node) in nodes.iter_mut().enumerate() {
-        for (link, &count) in node.link.iter_mut().zip(&node.count) {
-            if count == 0 {
-                *link += at as u32;
-                continue;
-            }
+    for node in nodes {
+        let links = node.link.iter_mut().zip(&node.count);
+        for (link, &count) in links.filter(|(_, count)| **count != 0) {
             let first = *link as usize;
             let mut leaf = [NONE; LEAF];
             for (place, entry) in leaf.iter_mut().zip(&entries[first..first + count as usize]) {
@@ -175,105 +165,27 @@ fn number(nodes: &mut [Node], entries: &[Entry]) -> Vec<Leaf> {
     leaves
 }
 
-/// Appends the subtree over `entries`, which start at place `first`, in depth-first order.
-fn grow(entries: &mut [Entry], first: usize, whole: Bounds, depth: u32, nodes: &mut Vec<Node>) {
-    let parts = children(entries, whole, depth);
-    let at = nodes.len();
-    nodes.push(Node::around(&parts, first));
-    if entries.len() <= PARALLEL {
-        for (child, part) in parts.iter().enumerate().filter(|(_, p)| !p.is_leaf()) {
-            // Links are relative, so that subtrees made apart are joined by copying alone.
-            nodes[at].link[child] = (nodes.len() - at) as u32;
-            let (start, range) = (first + part.range.start, part.range.clone());
-            grow(&mut entries[range], start, part.bounds, depth + 1, nodes);
-        }
+/// Appends the subtree over `entries`, which start at place `first`, children before parents.
+fn grow(entries: &mut [Entry], first: usize, whole: Bounds, depth: u32, twigs: &mut Vec<Twig>) {
+    let count = entries.len();
+    if count <= LEAF {
+        twigs.push(Twig::leaf(whole.all, first, count));
         return;
     }
-    let mut rest = entries;
-    let mut slices = Vec::with_capacity(parts.len());
-    for part in &parts {
-        let (slice, after) = rest.split_at_mut(part.range.len());
-        slices.push((slice, part));
-        rest = after;
+    let (middle, sides) = split(entries, whole, depth);
+    let (a, b) = entries.split_at_mut(middle);
+    let before = twigs.len();
+    let mut left = |twigs: &mut Vec<Twig>| grow(a, first, sides[0], depth + 1, twigs);
+    let mut right = |twigs: &mut Vec<Twig>| grow(b, first + middle, sides[1], depth + 1, twigs);
+    if count <= PARALLEL {
+        left(twigs);
+        right(twigs);
+    } else {
+        let mut others = Vec::new();
+        rayon::join(|| left(twigs), || right(&mut others));
+        twigs.append(&mut others);
     }
-    let subtrees: Vec<Vec<Node>> = slices
-        .into_par_iter()
-        .map(|(slice, part)| {
-            let mut nodes = Vec::new();
-            if !part.is_leaf() {
-                let start = first + part.range.start;
-                grow(slice, start, part.bounds, depth + 1, &mut nodes);
-            }
-            nodes
-        })
-        .collect();
-    for (child, mut subtree) in subtrees.into_iter().enumerate() {
-        if !subtree.is_empty() {
-            nodes[at].link[child] = (nodes.len() - at) as u32;
-            nodes.append(&mut subtree);
-        }
-    }
-}
-
-impl Part {
-    fn is_leaf(&self) -> bool {
-        self.range.len() <= LEAF
-    }
-}
-
-impl Node {
-    /// A node whose leaves link to places of entries, and whose other links are yet to be made.
-    fn around(parts: &[Part], first: usize) -> Node {
-        // Inside out where there is no child.
-        let mut planes = [[[f32::INFINITY; WIDTH], [f32::NEG_INFINITY; WIDTH]]; 3];
-        let mut node = Node {
-            planes: [[Lanes::ZERO; 2]; 3],
-            link: [0; WIDTH],
-            count: [0; WIDTH],
-        };
-        for (child, part) in parts.iter().enumerate() {
-            let (lo, hi) = (part.bounds.all.lo.to_array(), part.bounds.all.hi.to_array());
-            for axis in 0..3 {
-                planes[axis][0][child] = lo[axis];
-                planes[axis][1][child] = hi[axis];
-            }
-            if part.is_leaf() {
-                node.link[child] = (first + part.range.start) as u32;
-                node.count[child] = part.range.len() as u32;
-            }
-        }
-        node.planes = planes.map(|pair| pair.map(Lanes::new));
-        node
-    }
-}
-
-/// Orders the entries into up to eight parts: the largest that is no leaf is split until then.
-fn children(entries: &mut [Entry], whole: Bounds, depth: u32) -> Vec<Part> {
-    let mut parts = Vec::with_capacity(WIDTH);
-    parts.push(Part {
-        range: 0..entries.len(),
-        bounds: whole,
-    });
-    while parts.len() < WIDTH {
-        let area = |part: &Part| part.bounds.all.half_area();
-        let largest = (0..parts.len())
-            .filter(|p| !parts[*p].is_leaf())
-            .max_by(|a, b| area(&parts[*a]).total_cmp(&area(&parts[*b])));
-        let Some(largest) = largest else { break };
-        let Part { range, bounds } = parts[largest].clone();
-        let (middle, sides) = split(&mut entries[range.clone()], bounds, depth);
-        let middle = range.start + middle;
-        parts[largest] = Part {
-            range: range.start..middle,
-            bounds: sides[0],
-        };
-        let second = Part {
-            range: middle..range.end,
-            bounds: sides[1],
-        };
-        parts.insert(largest + 1, second);
-    }
-    parts
+    twigs.push(Twig::fork(whole.all, &twigs[before..]));
 }
 
 /// Orders the entries into two sides, neither empty; returns the size of the first and their boxes.
