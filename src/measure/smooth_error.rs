@@ -31,7 +31,7 @@ pub struct SmoothError {
     /// Root mean square over the vertices of the distance, along its normals, to the fairest surface: the
     /// least bending within the diamond, after a thousand steps; in the smallest spacing.
     pub from_fairest: f64,
-    /// Mean angle between chords of the curves in which the fairest surface meets the planes of voxel
+    /// Root mean square of the angle between chords of the curves in which the fairest surface meets the planes of voxel
     /// centres, in degrees.
     pub fairest_turning_deg: f64,
 }

@@ -259,6 +259,7 @@ fn meshes() -> impl Strategy<Value = Mesh> {
                 segments: segments.into_iter().map(|s| s.map(|v| v % n)).collect(),
                 points: singles.into_iter().map(|v| v % n).collect(),
                 polygons: None,
+                sides: None,
             }
         })
 }

@@ -26,7 +26,7 @@ mod trade;
 
 use crate::error::{Error, Result};
 use crate::numeric::sums::sum_by;
-use crate::numeric::vector::{Vec3, cross, dot, length, scale, sub};
+use crate::numeric::vector::{Vec3, dot, sub};
 use crate::progress::Progress;
 use crate::trade::named;
 use crate::volume::isosurface::cases::step_of;
@@ -189,7 +189,7 @@ pub struct Stats {
     pub largest: Vec<Component>,
     /// Parts that keep less than a tenth of what marching cubes encloses.
     pub vanishing: u64,
-    /// Mean angle between chords of the curves in which the surface of marching cubes meets the planes of
+    /// Root mean square of the angle between chords of the curves in which the surface of marching cubes meets the planes of
     /// voxel centres, in degrees.
     pub turning_before_deg: f64,
     /// The same of the smooth surface.
@@ -241,7 +241,8 @@ pub fn smooth(
             Relax::new(surface, triangles, metric, &regions).run(params, &|| progress.advance(1))
         }
         Energy::Bilaplacian => {
-            let fair = Fair::new(surface, metric, &regions);
+            let reach = 0.5 * params.scale * (1.0 - STRICT);
+            let fair = Fair::new(surface, metric, reach, &regions);
             let target = parts.target(surface, metric);
             fair.run(params.threshold, params.max_iterations, &target, &|| {
                 progress.advance(1)
@@ -279,28 +280,35 @@ fn placed(surface: &Surface, metric: Vec3, offset: impl Fn(usize) -> Vec3 + Sync
         .collect()
 }
 
-/// Mean angle between one chord and the next of the curves in which a surface meets the planes of voxel
-/// centres, in degrees: what is left of the staircase, and what the shape itself turns.
+/// Root mean square of the angle between one chord and the next of the curves in which a surface meets
+/// the planes of voxel centres, in degrees: what is left of the staircase, and what the shape itself turns.
 ///
-/// `metric` is the spacing over the smallest one, `offset` in voxels. 0 where there is no curve.
+/// `metric` is the spacing over the smallest one, `offset` in voxels. 0 where there is no curve. The mean
+/// is taken of the squared distances between the directions, which needs no angle of each.
 pub fn turning(surface: &Surface, metric: Vec3, offset: impl Fn(usize) -> Vec3 + Sync) -> f64 {
     let chord = |v: usize, slot: usize| {
         let step = step_of(surface.steps[v][slot]);
         let d = sub(offset((surface.links[v][slot] >> 2) as usize), offset(v));
         std::array::from_fn(|a| (0.5 * f64::from(step[a]) + d[a]) * metric[a])
     };
+    let square = |v: &usize, c: usize| -> f64 {
+        let (a, b): (Vec3, Vec3) = (chord(*v, 2 * c), chord(*v, 2 * c + 1));
+        let size = (dot(a, a) * dot(b, b)).sqrt();
+        if size > 0.0 {
+            2.0 + 2.0 * dot(a, b) / size
+        } else {
+            0.0
+        }
+    };
     let vertices: Vec<usize> = (0..surface.len()).collect();
     let curves = |v: usize| (0..2).filter(move |c| !surface.links[v][2 * c..][..2].contains(&NONE));
-    let angles = sum_by(&vertices, |v| {
-        let angle = |c: usize| {
-            let (a, b): (Vec3, Vec3) = (scale(chord(*v, 2 * c), -1.0), chord(*v, 2 * c + 1));
-            length(cross(a, b)).atan2(dot(a, b))
-        };
-        curves(*v).map(angle).sum()
-    });
+    let squares = sum_by(&vertices, |v| curves(*v).map(|c| square(v, c)).sum());
     let count = sum_by(&vertices, |v| curves(*v).count() as f64);
     if count > 0.0 {
-        (angles / count).to_degrees()
+        2.0 * (0.5 * (squares / count).sqrt())
+            .min(1.0)
+            .asin()
+            .to_degrees()
     } else {
         0.0
     }

@@ -2,7 +2,7 @@
 
 use super::fair::{Fair, Inflate};
 use super::region::Region;
-use crate::numeric::vector::{Vec3, cross, dot, length, sub};
+use crate::numeric::vector::{Vec3, cross, dot, sub};
 use crate::volume::isosurface::{NONE, Surface, axis_of};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
@@ -15,10 +15,13 @@ const CHUNK: usize = 1 << 13;
 const FARTHEST: f64 = 0.25;
 
 /// What is enclosed is held to this share, where the regions allow it.
-const CLOSE: f64 = 1e-6;
+const CLOSE: f64 = 1e-5;
+
+/// A part is left where a round brings it no closer than this share.
+const GAIN: f64 = 0.95;
 
 /// Most rounds of filling.
-const ROUNDS: usize = 12;
+const ROUNDS: usize = 20;
 
 /// The parts of a surface, numbered by their first vertices.
 pub(super) struct Parts {
@@ -164,22 +167,42 @@ impl Parts {
         sums.into_iter().map(|s| s.volume).collect()
     }
 
+    /// Places from the first one of each vertex's part, in units of the metric.
+    fn placed(
+        &self,
+        surface: &Surface,
+        metric: Vec3,
+        offset: &(impl Fn(usize) -> Vec3 + Sync),
+    ) -> Vec<Vec3> {
+        (0..surface.len())
+            .into_par_iter()
+            .with_min_len(CHUNK)
+            .map(|v| {
+                let (place, origin) = (surface.places[v], self.origins[self.of[v] as usize]);
+                let moved = offset(v);
+                let at = |a: usize| 0.5 * f64::from(place[a] - origin[a]) + moved[a];
+                std::array::from_fn(|a| at(a) * metric[a])
+            })
+            .collect()
+    }
+
     fn sum(
         &self,
         surface: &Surface,
         metric: Vec3,
         offset: &(impl Fn(usize) -> Vec3 + Sync),
     ) -> Vec<Sum> {
+        let at = self.placed(surface, metric, offset);
         let chunks = surface.loops.chunks();
         let partial: Vec<BTreeMap<u32, Sum>> = chunks
             .into_par_iter()
             .map(|(lengths, mut corners)| {
-                let mut sums = Sums::new(self, surface, metric);
+                let mut sums = Sums::new(self, surface, &at);
                 for length in lengths {
                     let (polygon, rest) = corners.split_at(usize::from(*length));
                     corners = rest;
                     for i in 1..polygon.len() - 1 {
-                        sums.add([polygon[0], polygon[i], polygon[i + 1]], offset);
+                        sums.add([polygon[0], polygon[i], polygon[i + 1]]);
                     }
                 }
                 sums.done()
@@ -195,12 +218,16 @@ impl Parts {
         metric: Vec3,
         offset: &(impl Fn(usize) -> Vec3 + Sync),
     ) -> Vec<Sum> {
+        self.sum_placed(surface, triangles, &self.placed(surface, metric, offset))
+    }
+
+    fn sum_placed(&self, surface: &Surface, triangles: &[[u32; 3]], at: &[Vec3]) -> Vec<Sum> {
         let partial: Vec<BTreeMap<u32, Sum>> = triangles
             .par_chunks(CHUNK)
             .map(|chunk| {
-                let mut sums = Sums::new(self, surface, metric);
+                let mut sums = Sums::new(self, surface, at);
                 for t in chunk {
-                    sums.add(*t, offset);
+                    sums.add(*t);
                 }
                 sums.done()
             })
@@ -250,34 +277,60 @@ impl Parts {
         regions: &(dyn Fn(usize) -> Region + Sync),
         offsets: &mut Vec<Vec3>,
     ) {
-        let fair = Fair::new(surface, metric, regions);
+        let fair = Fair::new(surface, metric, 0.5, regions);
         let voxel = metric[0] * metric[1] * metric[2];
+        let mut left = vec![f64::INFINITY; self.len()];
+        let mut around: Vec<[u32; 3]> = triangles.to_vec();
+        let mut moving: Vec<u32> = (0..surface.len() as u32).collect();
+        let mut at: Vec<f32x4> = offsets
+            .par_iter()
+            .with_min_len(CHUNK)
+            .map(|o| single(*o, metric))
+            .collect();
+        let mut placed = self.placed(surface, metric, &|v| offsets[v]);
         for _ in 0..ROUNDS {
-            let sums = self.sum_triangles(surface, triangles, metric, &|v| offsets[v]);
-            let far = |(part, sum): (usize, &Sum)| {
+            let sums = self.sum_placed(surface, &around, &placed);
+            let mut open = vec![false; self.len()];
+            for (part, sum) in sums.iter().enumerate() {
                 let wanted = self.voxels[part].map_or(sum.volume, |v| v as f64 * voxel);
-                (sum.volume - wanted).abs() > CLOSE * wanted.abs()
-            };
-            let open: Vec<bool> = sums.iter().enumerate().map(far).collect();
+                let off = (sum.volume - wanted).abs();
+                // What the regions no longer let closer is left.
+                open[part] = off > CLOSE * wanted.abs() && off < GAIN * left[part];
+                // The sums of parts that are left are no longer whole.
+                left[part] = if open[part] { off } else { 0.0 };
+            }
             if !open.contains(&true) {
                 break;
             }
+            let moves = |v: u32| {
+                let (inside, outside) = self.sides(v as usize);
+                open[inside] || outside.is_some_and(|part| open[part])
+            };
+            // With labels, what is left on one side may be open on the other.
+            around.retain(|t| t.iter().any(|v| moves(*v)));
+            moving.retain(|v| moves(*v));
             let by = self.missing(&sums, metric);
-            let at: Vec<f32x4> = offsets.iter().map(|o| single(*o, metric)).collect();
-            offsets
-                .par_iter_mut()
-                .with_min_len(1 << 12)
-                .enumerate()
-                .for_each(|(v, offset)| {
-                    let part = self.of[v] as usize;
-                    if open[part] {
-                        let normal = fair.normal(&at, v).to_array();
-                        let moved = std::array::from_fn(|a| {
-                            offset[a] + f64::from(normal[a]) * by[part] / metric[a]
-                        });
-                        *offset = regions(v).project(moved, metric);
-                    }
-                });
+            let by = |v: usize| {
+                let (inside, outside) = self.sides(v);
+                let of = |part: usize| if open[part] { by[part] } else { 0.0 };
+                of(inside) - outside.map_or(0.0, of)
+            };
+            let next = |v: &u32| {
+                let v = *v as usize;
+                let (normal, by) = (fair.normal(&at, v).to_array(), by(v));
+                let moved = |a: usize| offsets[v][a] + f64::from(normal[a]) * by / metric[a];
+                regions(v).project(std::array::from_fn(moved), metric)
+            };
+            let moved: Vec<Vec3> = moving.par_iter().with_min_len(CHUNK).map(next).collect();
+            for (v, moved) in moving.iter().zip(moved) {
+                let v = *v as usize;
+                let d = sub(moved, offsets[v]);
+                for a in 0..3 {
+                    placed[v][a] += d[a] * metric[a];
+                }
+                at[v] = single(moved, metric);
+                offsets[v] = moved;
+            }
         }
     }
 }
@@ -299,25 +352,26 @@ struct Sum {
 struct Sums<'a> {
     parts: &'a Parts,
     surface: &'a Surface,
-    metric: Vec3,
+    at: &'a [Vec3],
     all: BTreeMap<u32, Sum>,
     current: (u32, Option<u32>),
     sum: Sum,
 }
 
 impl<'a> Sums<'a> {
-    fn new(parts: &'a Parts, surface: &'a Surface, metric: Vec3) -> Self {
+    fn new(parts: &'a Parts, surface: &'a Surface, at: &'a [Vec3]) -> Self {
         Sums {
             parts,
             surface,
-            metric,
+            at,
             all: BTreeMap::new(),
             current: (0, None),
             sum: Sum::default(),
         }
     }
 
-    fn add(&mut self, triangle: [u32; 3], offset: &impl Fn(usize) -> Vec3) {
+    #[inline]
+    fn add(&mut self, triangle: [u32; 3]) {
         let (part, outside) = match self.surface.sides_of(&triangle) {
             Some([inside, outside]) => (u32::from(inside), Some(u32::from(outside))),
             None => (self.parts.of[triangle[0] as usize], None),
@@ -326,18 +380,10 @@ impl<'a> Sums<'a> {
             self.flush();
             self.current = (part, outside);
         }
-        let origin = self.parts.origins[part as usize];
-        let [a, b, c] = triangle.map(|v| {
-            let (place, moved) = (self.surface.places[v as usize], offset(v as usize));
-            let at = |axis: usize| {
-                let steps = 0.5 * f64::from(place[axis] - origin[axis]) + moved[axis];
-                steps * self.metric[axis]
-            };
-            [at(0), at(1), at(2)]
-        });
+        let [a, b, c] = triangle.map(|v| self.at[v as usize]);
         let normal = cross(sub(b, a), sub(c, a));
         self.sum.volume += dot(normal, a) / 6.0;
-        self.sum.area += 0.5 * length(normal);
+        self.sum.area += 0.5 * dot(normal, normal).sqrt();
     }
 
     fn flush(&mut self) {
