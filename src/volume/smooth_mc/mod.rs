@@ -17,6 +17,7 @@
 //! never gets small, where steps are meant; ties of its rounding are settled by parity ([`lattice`]).
 
 mod fair;
+pub mod lattice;
 mod parts;
 pub mod region;
 mod relax;
