@@ -18,9 +18,11 @@
 
 mod fair;
 pub mod lattice;
+mod neighbours;
 mod parts;
 pub mod region;
 mod relax;
+pub mod taubin;
 #[cfg(test)]
 mod tests;
 

@@ -4,7 +4,7 @@ use crate::progress::Silent;
 use crate::volume::isosurface::{Border, Select, extract};
 use crate::volume::{Data, Frame, Volume};
 
-fn ball(radius: f64, n: usize, at: f64) -> Volume {
+pub(super) fn ball(radius: f64, n: usize, at: f64) -> Volume {
     let mut v = Vec::new();
     for z in 0..n {
         for y in 0..n {
@@ -21,7 +21,7 @@ fn ball(radius: f64, n: usize, at: f64) -> Volume {
 }
 
 /// Root mean square of the angle between triangles and a ball's surface, by area, in degrees.
-fn normal_rms(positions: &[Vec3], triangles: &[[u32; 3]], centre: f64) -> f64 {
+pub(super) fn normal_rms(positions: &[Vec3], triangles: &[[u32; 3]], centre: f64) -> f64 {
     let (mut sum, mut area) = (0.0, 0.0);
     for t in triangles {
         let [a, b, c] = t.map(|v| positions[v as usize]);
