@@ -13,7 +13,7 @@
 //! 2015.
 
 pub mod cases;
-mod slab;
+pub(in crate::volume) mod slab;
 #[cfg(test)]
 mod tests;
 mod triangulate;

@@ -7,13 +7,13 @@ use crate::with_samples;
 use wide::u8x16;
 
 /// Slices that one thread works on at a time.
-pub(super) const SLAB: usize = 8;
+pub(in crate::volume) const SLAB: usize = 8;
 
 /// Slices of a grid with a margin of one voxel all around that is outside.
 ///
 /// Plane `p` is slice `first + p - 1` of the margin's grid: one below and two above those that the
 /// slab stands for are held too. An edge is crossed between a voxel and the next one along its axis.
-pub(super) struct Slab {
+pub(in crate::volume) struct Slab {
     /// Slices that the slab stands for, in the margin's grid.
     pub first: usize,
     pub count: usize,
@@ -27,7 +27,7 @@ pub(super) struct Slab {
 
 /// Which part of the margin's grid has cells: all of it, or what lies within the volume.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Extent {
+pub(in crate::volume) struct Extent {
     /// Voxels of the margin's grid.
     pub dims: [usize; 3],
     /// Voxels left away on each side.
@@ -35,7 +35,7 @@ pub(super) struct Extent {
 }
 
 impl Extent {
-    pub(super) fn new(dims: [usize; 3], closed: bool) -> Self {
+    pub(in crate::volume) fn new(dims: [usize; 3], closed: bool) -> Self {
         Extent {
             dims: dims.map(|n| n + 2),
             ring: usize::from(!closed),
@@ -43,17 +43,17 @@ impl Extent {
     }
 
     /// The first cell along an axis.
-    pub(super) fn first(&self) -> usize {
+    pub(in crate::volume) fn first(&self) -> usize {
         self.ring
     }
 
     /// One past the last cell along an axis.
-    pub(super) fn end(&self, axis: usize) -> usize {
+    pub(in crate::volume) fn end(&self, axis: usize) -> usize {
         (self.dims[axis] - 1).saturating_sub(self.ring)
     }
 
     /// Slices that a slab may stand for, the last one with no cell above it.
-    pub(super) fn slices(&self) -> std::ops::Range<usize> {
+    pub(in crate::volume) fn slices(&self) -> std::ops::Range<usize> {
         self.first()..self.end(2) + 1
     }
 
@@ -68,7 +68,12 @@ impl Extent {
 
 impl Slab {
     /// Reads the slices from `first` on.
-    pub(super) fn read(volume: &Volume, select: &Select, extent: &Extent, first: usize) -> Slab {
+    pub(in crate::volume) fn read(
+        volume: &Volume,
+        select: &Select,
+        extent: &Extent,
+        first: usize,
+    ) -> Slab {
         let [nx, ny, _] = extent.dims;
         let count = SLAB.min(extent.slices().end - first);
         let stride = nx.div_ceil(64);
@@ -168,21 +173,21 @@ impl Slab {
 
     /// What is inside in row `y` of slice `first + k`.
     #[inline]
-    pub(super) fn inside(&self, k: usize, y: usize) -> &[u64] {
+    pub(in crate::volume) fn inside(&self, k: usize, y: usize) -> &[u64] {
         let at = ((k + 1) * self.ny + y) * self.stride;
         &self.inside[at..at + self.stride]
     }
 
     /// Which edges along `axis` that start in row `y` of slice `first + k` are crossed; `k` may be -1.
     #[inline]
-    pub(super) fn crossed(&self, axis: usize, k: isize, y: usize) -> &[u64] {
+    pub(in crate::volume) fn crossed(&self, axis: usize, k: isize, y: usize) -> &[u64] {
         let at = ((k + 1) as usize * self.ny + y) * self.stride;
         &self.crossed[axis][at..at + self.stride]
     }
 
     /// Those crossed edges whose next one along the axis, on either side, is crossed too: a part of
     /// one voxel's thickness lies between.
-    pub(super) fn thin(&self, axis: usize, k: usize, y: usize, word: usize) -> u64 {
+    pub(in crate::volume) fn thin(&self, axis: usize, k: usize, y: usize, word: usize) -> u64 {
         let k = k as isize;
         let own = self.crossed(axis, k, y);
         let at = own[word];

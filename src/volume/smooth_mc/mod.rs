@@ -16,6 +16,7 @@
 //! repairs: the sign of its equation (2); its test for the end compares with the first place, which
 //! never gets small, where steps are meant; ties of its rounding are settled by parity ([`lattice`]).
 
+pub mod cesn;
 mod fair;
 pub mod lattice;
 mod neighbours;
