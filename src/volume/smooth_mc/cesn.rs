@@ -386,4 +386,21 @@ mod tests {
         );
         assert!(none.expect("a net").places.is_empty());
     }
+
+    #[test]
+    fn any_number_of_threads_makes_the_same_net() {
+        let ball = ball(20.3, 44, 21.4);
+        let on = |threads: usize| {
+            rayon::ThreadPoolBuilder::new()
+                .num_threads(threads)
+                .build()
+                .expect("a pool")
+                .install(|| cesn(&ball, &Select::Set, Border::Closed, 0.002, 30, &Silent))
+                .expect("a net")
+        };
+        let one = on(1);
+        for threads in [2, 8] {
+            assert!(on(threads) == one);
+        }
+    }
 }

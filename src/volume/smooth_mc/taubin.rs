@@ -99,4 +99,23 @@ mod tests {
         assert_eq!(once[0], [0.75, 0.75, 0.0]);
         assert_eq!(taubin(&positions, &[[0, 1, 2]], 0, 0.5, 0.0), positions);
     }
+
+    #[test]
+    fn any_number_of_threads_moves_alike() {
+        let ball = ball(20.3, 44, 21.4);
+        let surface = extract(&ball, &Select::Set, Border::Closed, &Silent).expect("a surface");
+        let positions = surface.positions(&ball.frame, |_| [0.0; 3]);
+        let triangles = surface.triangles(&positions);
+        let on = |threads: usize| {
+            rayon::ThreadPoolBuilder::new()
+                .num_threads(threads)
+                .build()
+                .expect("a pool")
+                .install(|| taubin(&positions, &triangles, 9, LAMBDA, MU))
+        };
+        let one = on(1);
+        for threads in [2, 8] {
+            assert!(on(threads) == one);
+        }
+    }
 }

@@ -2,8 +2,8 @@
 //!
 //! Vertices of marching cubes lie halfway between two voxel centres, whence their coordinates are
 //! whole numbers of half voxels; which of the three is odd tells the axis of the vertex's edge. Spacing
-//! and origin are read from the coordinates ([`detect`]), all vertices are held to that rule, and the
-//! net of curves that the smoothing works on is found in the triangles ([`net`]). Any mesh that marching
+//! and origin are read from the coordinates (`detect`), all vertices are held to that rule, and the
+//! net of curves that the smoothing works on is found in the triangles (`net`). Any mesh that marching
 //! cubes made will do, however its cells were split and however its vertices are numbered or repeated.
 //!
 //! Source: "Constrained smoothing of marching cubes surfaces" (WSCG), section 3, with these repairs:

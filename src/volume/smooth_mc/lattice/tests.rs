@@ -383,3 +383,20 @@ fn meshes_that_are_of_no_binary_volume_are_refused_with_their_share() {
         })
     ));
 }
+
+#[test]
+fn any_number_of_threads_recovers_the_same() {
+    let volume = noise([40, 30, 35], 0.4, &mut Rng::new(6, 0));
+    let mesh = mesh_of(&volume, &surface_of(&volume, Border::Open));
+    let on = |threads: usize| {
+        rayon::ThreadPoolBuilder::new()
+            .num_threads(threads)
+            .build()
+            .expect("a pool")
+            .install(|| recovered(&mesh, Given::default()))
+    };
+    let one = on(1);
+    for threads in [2, 8] {
+        assert!(on(threads) == one);
+    }
+}
