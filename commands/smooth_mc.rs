@@ -55,7 +55,7 @@ pub struct Args {
     /// End when no vertex moves by this share of the smallest spacing in a step
     #[arg(long, value_name = "T", default_value_t = Params::DEFAULT.threshold)]
     threshold: f64,
-    /// Most steps [default: 30, and 2000 for the laplacian]
+    /// Most steps [default: 20, and 2000 for the laplacian]
     #[arg(long, value_name = "N", value_parser = value_parser!(u32).range(..=1_000_000))]
     max_iterations: Option<u32>,
     /// Share of the region that is used

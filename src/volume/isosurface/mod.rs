@@ -14,7 +14,7 @@
 
 pub mod cases;
 mod junction;
-mod slab;
+pub(in crate::volume) mod slab;
 #[cfg(test)]
 mod tests;
 mod triangulate;

@@ -7,7 +7,7 @@ use crate::with_samples;
 use wide::u8x16;
 
 /// Slices that one thread works on at a time.
-pub(super) const SLAB: usize = 8;
+pub(in crate::volume) const SLAB: usize = 8;
 
 /// Labels to be told apart, ascending; each is known by its number in the list plus one, and all others
 /// by 0.
@@ -53,7 +53,7 @@ impl Labels {
 }
 
 /// What a slab is read for.
-pub(super) enum Source<'a> {
+pub(in crate::volume) enum Source<'a> {
     Select(&'a Select),
     Labels(&'a Labels),
 }
@@ -62,7 +62,7 @@ pub(super) enum Source<'a> {
 ///
 /// Plane `p` is slice `first + p - 1` of the margin's grid: one below and two above those that the
 /// slab stands for are held too. An edge is crossed between a voxel and the next one along its axis.
-pub(super) struct Slab {
+pub(in crate::volume) struct Slab {
     /// Slices that the slab stands for, in the margin's grid.
     pub first: usize,
     pub count: usize,
@@ -80,7 +80,7 @@ pub(super) struct Slab {
 
 /// Which part of the margin's grid has cells: all of it, or what lies within the volume.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Extent {
+pub(in crate::volume) struct Extent {
     /// Voxels of the margin's grid.
     pub dims: [usize; 3],
     /// Voxels left away on each side.
@@ -88,7 +88,7 @@ pub(super) struct Extent {
 }
 
 impl Extent {
-    pub(super) fn new(dims: [usize; 3], closed: bool) -> Self {
+    pub(in crate::volume) fn new(dims: [usize; 3], closed: bool) -> Self {
         Extent {
             dims: dims.map(|n| n + 2),
             ring: usize::from(!closed),
@@ -96,17 +96,17 @@ impl Extent {
     }
 
     /// The first cell along an axis.
-    pub(super) fn first(&self) -> usize {
+    pub(in crate::volume) fn first(&self) -> usize {
         self.ring
     }
 
     /// One past the last cell along an axis.
-    pub(super) fn end(&self, axis: usize) -> usize {
+    pub(in crate::volume) fn end(&self, axis: usize) -> usize {
         (self.dims[axis] - 1).saturating_sub(self.ring)
     }
 
     /// Slices that a slab may stand for, the last one with no cell above it.
-    pub(super) fn slices(&self) -> std::ops::Range<usize> {
+    pub(in crate::volume) fn slices(&self) -> std::ops::Range<usize> {
         self.first()..self.end(2) + 1
     }
 
@@ -121,7 +121,12 @@ impl Extent {
 
 impl Slab {
     /// Reads the slices from `first` on.
-    pub(super) fn read(volume: &Volume, source: &Source, extent: &Extent, first: usize) -> Slab {
+    pub(in crate::volume) fn read(
+        volume: &Volume,
+        source: &Source,
+        extent: &Extent,
+        first: usize,
+    ) -> Slab {
         let [nx, ny, _] = extent.dims;
         let count = SLAB.min(extent.slices().end - first);
         let stride = nx.div_ceil(64);
@@ -206,7 +211,11 @@ impl Slab {
 
     /// The numbers of the labels at both ends of an edge that starts at voxel `[x, y, first + k]`.
     #[inline]
-    pub(super) fn labels_at(&self, [x, y, k]: [usize; 3], axis: usize) -> Option<[u16; 2]> {
+    pub(in crate::volume) fn labels_at(
+        &self,
+        [x, y, k]: [usize; 3],
+        axis: usize,
+    ) -> Option<[u16; 2]> {
         if self.labels.is_empty() {
             return None;
         }
@@ -217,7 +226,7 @@ impl Slab {
 
     /// The numbers of the labels at the corners of a cell.
     #[inline]
-    pub(super) fn labels_of_cell(&self, [x, y, k]: [usize; 3]) -> Option<[u16; 8]> {
+    pub(in crate::volume) fn labels_of_cell(&self, [x, y, k]: [usize; 3]) -> Option<[u16; 8]> {
         if self.labels.is_empty() {
             return None;
         }
@@ -310,21 +319,21 @@ impl Slab {
 
     /// What is inside in row `y` of slice `first + k`.
     #[inline]
-    pub(super) fn inside(&self, k: usize, y: usize) -> &[u64] {
+    pub(in crate::volume) fn inside(&self, k: usize, y: usize) -> &[u64] {
         let at = ((k + 1) * self.ny + y) * self.stride;
         &self.inside[at..at + self.stride]
     }
 
     /// Which edges along `axis` that start in row `y` of slice `first + k` are crossed; `k` may be -1.
     #[inline]
-    pub(super) fn crossed(&self, axis: usize, k: isize, y: usize) -> &[u64] {
+    pub(in crate::volume) fn crossed(&self, axis: usize, k: isize, y: usize) -> &[u64] {
         let at = ((k + 1) as usize * self.ny + y) * self.stride;
         &self.crossed[axis][at..at + self.stride]
     }
 
     /// Those crossed edges whose next one along the axis, on either side, is crossed too: a part of
     /// one voxel's thickness lies between.
-    pub(super) fn thin(&self, axis: usize, k: usize, y: usize, word: usize) -> u64 {
+    pub(in crate::volume) fn thin(&self, axis: usize, k: usize, y: usize, word: usize) -> u64 {
         let k = k as isize;
         let own = self.crossed(axis, k, y);
         let at = own[word];

@@ -16,10 +16,14 @@
 //! repairs: the sign of its equation (2); its test for the end compares with the first place, which
 //! never gets small, where steps are meant; ties of its rounding are settled by parity ([`lattice`]).
 
+pub mod cesn;
 mod fair;
+pub mod lattice;
+mod neighbours;
 mod parts;
 pub mod region;
 mod relax;
+pub mod taubin;
 #[cfg(test)]
 mod tests;
 mod trade;
@@ -96,13 +100,13 @@ pub struct Params {
 }
 
 impl Params {
-    /// Fair, in the diamond, in thirty steps at most.
+    /// Fair, in the diamond, in twenty steps at most.
     pub const DEFAULT: Params = Params {
         constraint: Constraint::Diamond,
         energy: Energy::Bilaplacian,
         update: Update::Jacobi,
         threshold: 0.002,
-        max_iterations: 30,
+        max_iterations: 20,
         scale: 1.0,
         thin: Thin::Guard,
     };

@@ -1,5 +1,6 @@
 //! The paper's relaxation: each vertex to the mean of its neighbours, clipped.
 
+use super::neighbours::Neighbours;
 use super::region::Region;
 use super::{Outcome, Params, Stop, Update};
 use crate::numeric::vector::{Vec3, add, length, scale, sub};
@@ -16,9 +17,7 @@ pub(super) struct Relax<'a> {
     surface: &'a Surface,
     metric: Vec3,
     regions: &'a (dyn Fn(usize) -> Region + Sync),
-    /// Neighbours of vertex `v`: `neighbours[starts[v]..starts[v + 1]]`, by their places.
-    starts: Vec<u32>,
-    neighbours: Vec<u32>,
+    neighbours: Neighbours,
 }
 
 impl<'a> Relax<'a> {
@@ -30,46 +29,18 @@ impl<'a> Relax<'a> {
         metric: Vec3,
         regions: &'a (dyn Fn(usize) -> Region + Sync),
     ) -> Self {
-        let n = surface.len();
         let ends =
             |v: u32| surface.is_on_edge(v as usize) && surface.links[v as usize].contains(&NONE);
-        let mut counts = vec![0u32; n + 1];
-        for v in triangles.iter().flatten() {
-            counts[*v as usize + 1] += 2;
-        }
-        for v in 0..n {
-            counts[v + 1] += counts[v];
-        }
-        let mut filled = counts.clone();
-        let mut all = vec![0u32; counts[n] as usize];
-        for t in triangles {
-            for i in 0..3 {
-                let v = t[i] as usize;
-                all[filled[v] as usize] = t[(i + 1) % 3];
-                all[filled[v] as usize + 1] = t[(i + 2) % 3];
-                filled[v] += 2;
-            }
-        }
-        let mut starts = Vec::with_capacity(n + 1);
-        let mut neighbours = Vec::with_capacity(all.len() / 2);
-        starts.push(0);
-        for v in 0..n {
-            let own = &mut all[counts[v] as usize..counts[v + 1] as usize];
-            own.sort_unstable_by_key(|w| (surface.places[*w as usize], *w));
-            let first = neighbours.len();
-            for w in own {
-                let stays = !ends(v as u32) || ends(*w);
-                if stays && neighbours[first..].last() != Some(w) {
-                    neighbours.push(*w);
-                }
-            }
-            starts.push(neighbours.len() as u32);
-        }
+        let neighbours = Neighbours::new(
+            surface.len(),
+            triangles,
+            |w| (surface.places[w as usize], w),
+            |v, w| !ends(v) || ends(w),
+        );
         Relax {
             surface,
             metric,
             regions,
-            starts,
             neighbours,
         }
     }
@@ -125,7 +96,11 @@ impl<'a> Relax<'a> {
                 .enumerate()
                 .with_min_len(CHUNK)
                 .for_each(|(v, awake)| {
-                    let near = self.near(v).iter().any(|w| moved[*w as usize] >= still);
+                    let near = self
+                        .neighbours
+                        .of(v)
+                        .iter()
+                        .any(|w| moved[*w as usize] >= still);
                     *awake = near || moved[v] >= still;
                 });
             if !awake.contains(&true) {
@@ -136,10 +111,6 @@ impl<'a> Relax<'a> {
         (offsets, outcome)
     }
 
-    fn near(&self, v: usize) -> &[u32] {
-        &self.neighbours[self.starts[v] as usize..self.starts[v + 1] as usize]
-    }
-
     /// How far apart two offsets are, in the smallest spacing.
     fn way(&self, a: Vec3, b: Vec3) -> f64 {
         let d = sub(a, b);
@@ -148,7 +119,7 @@ impl<'a> Relax<'a> {
 
     /// The mean of the neighbours from the vertex's first place, clipped.
     fn target(&self, v: usize, offsets: &[Vec3]) -> Vec3 {
-        let near = self.near(v);
+        let near = self.neighbours.of(v);
         if near.is_empty() {
             return offsets[v];
         }

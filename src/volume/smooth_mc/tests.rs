@@ -4,7 +4,7 @@ use crate::progress::Silent;
 use crate::volume::isosurface::{Border, Select, extract};
 use crate::volume::{Data, Frame, Volume};
 
-fn ball(radius: f64, n: usize, at: f64) -> Volume {
+pub(super) fn ball(radius: f64, n: usize, at: f64) -> Volume {
     let mut v = Vec::new();
     for z in 0..n {
         for y in 0..n {
@@ -21,7 +21,7 @@ fn ball(radius: f64, n: usize, at: f64) -> Volume {
 }
 
 /// Root mean square of the angle between triangles and a ball's surface, by area, in degrees.
-fn normal_rms(positions: &[Vec3], triangles: &[[u32; 3]], centre: f64) -> f64 {
+pub(super) fn normal_rms(positions: &[Vec3], triangles: &[[u32; 3]], centre: f64) -> f64 {
     let (mut sum, mut area) = (0.0, 0.0);
     for t in triangles {
         let [a, b, c] = t.map(|v| positions[v as usize]);
@@ -46,7 +46,6 @@ fn a_ball_becomes_round_and_keeps_its_volume() {
         smooth(&surface, None, [1.0; 3], &Params::DEFAULT, &Silent).expect("a smooth surface");
     let positions = surface.positions(&ball.frame, |v| offsets[v]);
     let rms = normal_rms(&positions, &triangles, centre);
-    println!("{rms} {stats:?}");
     assert!(rms <= 3.0, "{rms}");
     let voxels = stats.voxels.expect("closed") as f64;
     assert_eq!(voxels, ball.count_set() as f64);
