@@ -1,28 +1,38 @@
 //! `scantle smooth-mc`: a binary volume becomes a smooth surface that keeps every voxel on its side.
 
+mod names;
+mod result;
+mod select;
+
 use crate::context::{Context, Files};
 use crate::exit::Exit;
 use crate::job::{Found, Job};
 use crate::shared::{Common, Inputs, MaxError, Output, Preview, Verify, list, named};
 use clap::value_parser;
-use scantle::error::{Error, Result};
+use result::{Body, Stats};
+use scantle::error::{Error, Fault, Result, number};
 use scantle::image::colour::{CLAY, OKABE_ITO};
+use scantle::io::Content;
 use scantle::io::format::Kind;
-use scantle::measure::smooth_error::{self, SmoothError};
+use scantle::measure::smooth_error::{self, Judged, Smoothed, Voxels};
 use scantle::mesh::Mesh;
-use scantle::numeric::vector::length;
 use scantle::render::preview::{self, Panel, What};
-use scantle::report::{Accuracy, Measures, Modelled, Warning};
+use scantle::report::{Measures, Modelled, Warning};
+use scantle::volume::bits::BitGrid;
 use scantle::volume::isosurface::{self, Border, Labels, Select, Surface};
+use scantle::volume::smooth_mc::lattice::{self, Given, Lattice};
 use scantle::volume::smooth_mc::region::Constraint;
-use scantle::volume::smooth_mc::{self, Energy, Params, Thin, Update};
+use scantle::volume::smooth_mc::{self, Energy, Params, Thin, Update, cesn, taubin};
 use scantle::volume::{Frame, Volume};
 use schemars::JsonSchema;
+use select::Inside;
 use serde::Serialize;
+use std::collections::BTreeMap;
 
 /// Smooth the surface of a binary volume or of labels, with every voxel kept on its side
 ///
-/// A volume is cut by marching cubes, and the staircase taken off it. Vertices stay within half a
+/// A volume is cut by marching cubes, and the staircase taken off it; a mesh must be one that marching
+/// cubes made of a binary volume, whose grid is read from the mesh. Vertices stay within half a
 /// voxel of where they start, in a region that no voxel's centre can be passed from: the smooth
 /// surface stands for the same voxels, which --verify counts anew. The volume enclosed is held to
 /// theirs.
@@ -68,6 +78,13 @@ pub struct Args {
     /// Where the volume ends: `closed`, the surface is closed there; `open`, it ends
     #[arg(long, default_value = Border::Closed.name(), value_parser = named(Border::NAMES, Border::from_name), conflicts_with = "labels")]
     border: Border,
+    /// Surfaces to judge beside this one: `mc`, as it was; `cesn`, the dual surface relaxed in its cells;
+    /// `taubin`, 110 rounds without a constraint
+    #[arg(long, value_name = "METHOD,...", value_delimiter = ',', value_parser = named(Other::NAMES, Other::from_name))]
+    compare: Vec<Other>,
+    /// A table of labels and their names, as comma-separated values
+    #[arg(long, value_name = "FILE", requires = "labels")]
+    label_names: Option<String>,
     /// Steps of the grid along x, y, z, instead of the file's
     #[arg(long, value_name = "DX,DY,DZ", value_parser = spacing)]
     spacing: Option<[f64; 3]>,
@@ -97,6 +114,27 @@ Examples:
   scantle smooth-mc fixtures/volumes/labels.nii.gz --label 1 -o one.ply --preview one.png
   scantle smooth-mc fixtures/volumes/labels.nii.gz --labels all -o 'label-{label}.ply' --verify
 ";
+
+/// A method to compare with.
+#[derive(Debug, Clone, Copy)]
+enum Other {
+    Mc,
+    Cesn,
+    Taubin,
+}
+
+impl Other {
+    const NAMES: &'static [&'static str] = &["mc", "cesn", "taubin"];
+
+    fn from_name(name: &str) -> Option<Self> {
+        let all = [Other::Mc, Other::Cesn, Other::Taubin];
+        all.into_iter().find(|other| other.name() == name)
+    }
+
+    const fn name(self) -> &'static str {
+        Self::NAMES[self as usize]
+    }
+}
 
 /// Which labels.
 #[derive(Debug, Clone)]
@@ -135,76 +173,6 @@ pub struct Asked {
     params: Params,
 }
 
-/// What counts as inside.
-#[derive(Debug, Clone, Serialize, JsonSchema)]
-#[serde(rename_all = "kebab-case")]
-pub enum Inside {
-    /// Every value but 0.
-    Set,
-    /// This value.
-    Label(f64),
-    /// Each of these values, a body of its own.
-    Labels(Vec<f64>),
-    /// This value and larger ones.
-    AtLeast(f64),
-}
-
-/// A body.
-#[derive(Debug, Serialize, JsonSchema)]
-pub struct Body {
-    /// Its value.
-    label: f64,
-    /// Triangles around it.
-    triangles: u64,
-    /// Its voxels.
-    voxels: i64,
-    /// What marching cubes encloses, in percent of the voxels.
-    volume_before_percent: f64,
-    /// What is enclosed now, in percent of the voxels.
-    volume_percent: f64,
-    /// Voxels of it that lie outside, and others that lie inside; only with `--verify`.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    misclassified_voxels: Option<u64>,
-}
-
-/// Distances between surfaces.
-#[derive(Debug, Serialize, JsonSchema)]
-pub struct Hausdorff {
-    /// In diagonals of a cell.
-    cell_diagonals: f64,
-    /// In the smallest spacing.
-    voxels: f64,
-    /// Whether it was measured; else it is the longest way of a vertex, which is no smaller.
-    measured: bool,
-}
-
-/// What was made.
-#[derive(Debug, Serialize, JsonSchema)]
-pub struct Stats {
-    /// Vertices of the surface.
-    vertices: u64,
-    /// Its triangles; a wall between two labels counts once.
-    triangles: u64,
-    /// Steps of the grid along its axes.
-    spacing: [f64; 3],
-    /// Centre of its first voxel.
-    origin: [f64; 3],
-    #[serde(flatten)]
-    smoothing: smooth_mc::Stats,
-    /// What is enclosed, in percent of what marching cubes encloses; null where the surface is open.
-    volume_percent: Option<f64>,
-    /// What is enclosed, in percent of the voxels; null where the surface is open.
-    voxel_volume_percent: Option<f64>,
-    /// The symmetric distance to the surface of marching cubes.
-    hausdorff: Hausdorff,
-    /// The bodies, where several labels were asked for.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
-    labels: Vec<Body>,
-    /// What `--verify` measured.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    verified: Option<SmoothError>,
-}
-
 /// The report of this command.
 pub type Report = scantle::report::Report<Asked, Stats>;
 
@@ -234,130 +202,218 @@ pub fn run(args: &Args) -> Result<Exit> {
     })
 }
 
+/// A surface to be smoothed, and what is known of where it comes from.
+pub struct Piece {
+    surface: Surface,
+    frame: Frame,
+    inside: Inside,
+    /// The voxels, where they are needed to verify.
+    bits: Option<BitGrid>,
+    /// The mesh that it was read from.
+    mesh: Option<(Mesh, Lattice)>,
+    /// The volume that it was taken from.
+    volume: Option<Volume>,
+}
+
+impl Piece {
+    fn voxels(&self, border: Border) -> Voxels<'_> {
+        match (&self.bits, &self.mesh) {
+            (Some(bits), _) if border == Border::Closed => Voxels::Given(bits),
+            (_, Some(_)) if self.surface.ends() == 0 => Voxels::Enclosed,
+            _ => Voxels::Unknown,
+        }
+    }
+
+    /// Vertices of the result, as they are in the file.
+    fn positions(&self, offsets: &[[f64; 3]]) -> Vec<[f64; 3]> {
+        match &self.mesh {
+            Some((mesh, lattice)) => lattice.positions(mesh, offsets),
+            None => self.surface.positions(&self.frame, |v| offsets[v]),
+        }
+    }
+}
+
 fn smooth(job: &mut Job, params: &Params, args: &Args, memory: u64) -> Result<Found<Asked, Stats>> {
     job.expect_output(&[Kind::Mesh])?;
-    let mut volume = job.read_volume()?;
+    match job.read()? {
+        Content::Volume(volume) => of_volume(job, volume, params, args, memory),
+        Content::Mesh(mesh) => of_mesh(job, mesh, params, args, memory),
+        other => {
+            let found = other.kind().with_article();
+            let fault = Fault::whole(format!("holds {found}, but a volume or a mesh is needed"));
+            Err(Error::Geometry(fault))
+        }
+    }
+}
+
+fn of_volume(
+    job: &mut Job,
+    mut volume: Volume,
+    params: &Params,
+    args: &Args,
+    memory: u64,
+) -> Result<Found<Asked, Stats>> {
     place(&mut volume.frame, args);
     isosurface::check_numbers(&volume).map_err(Error::Geometry)?;
-    let what = inside(&volume, args)?;
-    let (surface, bits) = match &what {
+    let what = select::inside(&volume, args)?;
+    let one = what.select();
+    let dual = params.constraint == Constraint::CellCenter;
+    let several = matches!(what, Inside::Labels(_));
+    if several && (dual || !args.compare.is_empty()) {
+        let option = if dual { "constraint" } else { "compare" };
+        let problem = "takes one label, and --labels names several; give --label";
+        return Err(Error::parameter(option, params.constraint.name(), problem));
+    }
+    let steps = volume.frame.spacing();
+    let (surface, made) = match &what {
         Inside::Labels(values) => {
             let labels = Labels::new(values.clone());
-            (
-                isosurface::extract_labels(&volume, &labels, job.progress())?,
-                None,
-            )
+            let walls = isosurface::extract_labels(&volume, &labels, job.progress())?;
+            let made = smooth_mc::smooth(&walls, None, steps, params, job.progress())?;
+            (walls, made)
         }
-        one => {
-            let select = one.select();
-            let surface = isosurface::extract(&volume, &select, args.border, job.progress())?;
-            let closed = args.border == Border::Closed && args.verify.verify;
-            (
-                surface,
-                closed.then(|| isosurface::inside(&volume, &select)),
-            )
+        _ if dual => {
+            let (surface, offsets, triangles, stats) =
+                smooth_mc::smooth_net(&volume, &one, args.border, params, job.progress())?;
+            (surface, (offsets, triangles, stats))
+        }
+        _ => {
+            let surface = isosurface::extract(&volume, &one, args.border, job.progress())?;
+            let made = smooth_mc::smooth(&surface, None, steps, params, job.progress())?;
+            (surface, made)
         }
     };
     if surface.is_empty() {
-        job.warn(vec![Warning::new(
-            "empty-surface",
-            "no voxel is inside: the surface is empty",
-            1,
-            None,
-        )]);
+        let message = "no voxel is inside: the surface is empty";
+        job.warn(vec![Warning::new("empty-surface", message, 1, None)]);
     }
-    let steps = volume.frame.spacing();
-    let (offsets, triangles, smoothing) =
-        smooth_mc::smooth(&surface, None, steps, params, job.progress())?;
+    let needed = !several && (args.verify.verify || !args.compare.is_empty());
+    let piece = Piece {
+        surface,
+        frame: volume.frame,
+        bits: needed.then(|| isosurface::inside(&volume, &one)),
+        inside: what,
+        mesh: None,
+        volume: Some(volume),
+    };
+    finish(job, piece, made, params, args, memory)
+}
+
+fn of_mesh(
+    job: &mut Job,
+    mesh: Mesh,
+    params: &Params,
+    args: &Args,
+    memory: u64,
+) -> Result<Found<Asked, Stats>> {
+    let dual = params.constraint == Constraint::CellCenter;
+    let label = args.label.map(number).unwrap_or_default();
+    let level = args.threshold_value.map(number).unwrap_or_default();
+    let of_volumes = [
+        ("label", args.label.is_some(), label.as_str()),
+        ("labels", args.labels.is_some(), "K,K"),
+        ("threshold-value", args.threshold_value.is_some(), &level),
+        ("constraint", dual, "cell-center"),
+    ];
+    if let Some((option, _, value)) = of_volumes.into_iter().find(|(_, given, _)| *given) {
+        let problem = "is for volumes, and this is a mesh";
+        return Err(Error::parameter(option, value, problem));
+    }
+    let given = Given {
+        spacing: args.spacing,
+        origin: args.origin,
+    };
+    let lattice = match lattice::recover(&mesh, given, job.progress()) {
+        Err(Error::Geometry(_)) if params.constraint == Constraint::CellSize => {
+            return of_any_mesh(job, mesh, params, args);
+        }
+        other => other?,
+    };
+    job.warn(lattice.warnings.clone());
+    let frame = lattice.frame();
+    let made = smooth_mc::smooth(
+        &lattice.surface,
+        Some(lattice.triangles()),
+        frame.spacing(),
+        params,
+        job.progress(),
+    )?;
+    let piece = Piece {
+        surface: lattice.surface.clone(),
+        frame,
+        inside: Inside::Set,
+        bits: None,
+        volume: None,
+        mesh: Some((mesh, lattice)),
+    };
+    finish(job, piece, made, params, args, memory)
+}
+
+/// Measures what was made, writes and reports it.
+fn finish(
+    job: &mut Job,
+    piece: Piece,
+    (offsets, triangles, smoothing): (Vec<[f64; 3]>, Vec<[u32; 3]>, smooth_mc::Stats),
+    params: &Params,
+    args: &Args,
+    memory: u64,
+) -> Result<Found<Asked, Stats>> {
     job.warn(thin_warning(&smoothing));
-    let positions = surface.positions(&volume.frame, |v| offsets[v]);
+    let smoothed = Smoothed {
+        surface: &piece.surface,
+        spacing: piece.frame.spacing(),
+        offsets: &offsets,
+        triangles: &triangles,
+    };
     let verified = args
         .verify
         .verify
         .then(|| {
-            smooth_error::measure(
-                &surface,
-                steps,
-                bits.as_ref(),
-                &offsets,
-                &triangles,
-                memory,
-                job.progress(),
-            )
+            let voxels = piece.voxels(args.border);
+            smooth_error::measure(&smoothed, voxels, memory, job.progress())
         })
         .transpose()?;
-    let mirrored = volume.frame.is_mirrored();
-    let out = |triangles: &[[u32; 3]]| turned(triangles, mirrored);
-    let mut bodies = Vec::new();
-    if let Inside::Labels(values) = &what {
-        for (i, value) in values.iter().enumerate() {
-            let own = surface.triangles_around(i as u16 + 1, &triangles);
-            let misclassified_voxels = args
-                .verify
-                .verify
-                .then(|| {
-                    let bits = isosurface::inside(&volume, &Select::Equal(*value));
-                    smooth_error::misclassified(
-                        &surface,
-                        &bits,
-                        &offsets,
-                        &own,
-                        memory,
-                        job.progress(),
-                    )
-                })
-                .transpose()?;
-            let part = &smoothing.parts[i + 1];
-            let voxels = part.voxels.unwrap_or(0);
-            let percent = |volume: f64| 100.0 * volume / voxels as f64;
-            bodies.push(Body {
-                label: *value,
-                triangles: own.len() as u64,
-                voxels,
-                volume_before_percent: percent(part.volume_before),
-                volume_percent: percent(part.volume_after),
-                misclassified_voxels,
-            });
-        }
-        if job.takes_labels() {
-            for (i, value) in values.iter().enumerate() {
-                let own = surface.triangles_around(i as u16 + 1, &triangles);
-                let mesh = Mesh::from_triangles(positions.clone(), out(&own)).compacted();
-                job.write_labelled(&scantle::error::number(*value), &mesh)?;
-            }
-        }
-    }
-    let mut mesh = Mesh::from_triangles(positions, out(&triangles));
-    if let Inside::Labels(values) = &what {
+    let compared = compare(job, &piece, &smoothed, params, args, memory)?;
+    let bodies = bodies(job, &piece, &smoothed, &smoothing, args, memory)?;
+    let mirrored = piece.frame.is_mirrored();
+    let positions = piece.positions(&offsets);
+    let mut mesh = match &piece.mesh {
+        Some((mesh, lattice)) => Mesh {
+            triangles: turned(&mesh.triangles, lattice.inverted),
+            colors: mesh.colors.clone(),
+            ..Mesh::from_triangles(positions, Vec::new())
+        },
+        None => Mesh::from_triangles(positions, turned(&triangles, mirrored)),
+    };
+    if let Inside::Labels(values) = &piece.inside {
         let name = |side: u16| match usize::from(side) {
             0 => 0,
             i => values[i - 1] as i32,
         };
-        let of = |t: &[u32; 3]| surface.sides_of(t).unwrap_or_default().map(name);
+        let of = |t: &[u32; 3]| piece.surface.sides_of(t).unwrap_or_default().map(name);
         mesh.sides = Some(triangles.iter().map(of).collect());
     }
-    if !job.takes_labels() {
+    if job.takes_labels() {
+        for (i, body) in bodies.iter().enumerate() {
+            let own = piece.surface.triangles_around(i as u16 + 1, &triangles);
+            let own = Mesh::from_triangles(mesh.positions.clone(), turned(&own, mirrored));
+            job.write_labelled(&number(body.label), &own.compacted())?;
+        }
+    } else {
         job.write_mesh(&mesh)?;
     }
-    let stats = Stats::new(
-        &surface,
-        &volume.frame,
-        smoothing,
-        bodies,
-        verified,
-        &offsets,
-        triangles.len(),
-    );
+    let stats =
+        Stats::new(&piece, smoothing, &offsets, triangles.len()).with(bodies, verified, compared);
     let summary = stats.summary();
     let accuracy = stats.accuracy(params);
     let wrong = stats.wrong(params);
-    job.write_preview(|_| picture(&surface, &volume.frame, &mesh, &stats));
+    job.write_preview(|_| picture(&piece, &mesh, &stats));
+    let made = modelled(&piece.surface, piece.frame.dims);
     let asked = Asked {
-        inside: what,
+        inside: piece.inside,
         border: args.border,
         params: *params,
     };
-    let made = modelled(&surface, volume.frame.dims);
     Ok(Found::new(asked, stats, summary)
         .accuracy(Measures::Many(accuracy))
         .modelled(made)
@@ -365,9 +421,149 @@ fn smooth(job: &mut Job, params: &Params, args: &Args, memory: u64) -> Result<Fo
         .beyond_measure(wrong))
 }
 
-/// Triangles turned over where the axes of the grid are left-handed.
-fn turned(triangles: &[[u32; 3]], mirrored: bool) -> Vec<[u32; 3]> {
-    let turn = |[a, b, c]: &[u32; 3]| if mirrored { [*a, *c, *b] } else { [*a, *b, *c] };
+/// The bodies, where there are several.
+fn bodies(
+    job: &mut Job,
+    piece: &Piece,
+    smoothed: &Smoothed,
+    smoothing: &smooth_mc::Stats,
+    args: &Args,
+    memory: u64,
+) -> Result<Vec<Body>> {
+    let (Inside::Labels(values), Some(volume)) = (&piece.inside, &piece.volume) else {
+        return Ok(Vec::new());
+    };
+    let names = match &args.label_names {
+        Some(file) => names::read(file, memory)?,
+        None => BTreeMap::new(),
+    };
+    let mut bodies = Vec::with_capacity(values.len());
+    for (i, value) in values.iter().enumerate() {
+        let own = piece
+            .surface
+            .triangles_around(i as u16 + 1, smoothed.triangles);
+        let mut misclassified_voxels = None;
+        if args.verify.verify {
+            let bits = isosurface::inside(volume, &Select::Equal(*value));
+            let around = Smoothed {
+                triangles: &own,
+                ..*smoothed
+            };
+            let voxels = Voxels::Given(&bits);
+            misclassified_voxels = around.misclassified(voxels, memory, job.progress())?;
+        }
+        let part = &smoothing.parts[i + 1];
+        let voxels = part.voxels.unwrap_or(0);
+        let percent = |volume: f64| 100.0 * volume / voxels as f64;
+        bodies.push(Body {
+            label: *value,
+            name: names.get(&number(*value)).cloned(),
+            triangles: own.len() as u64,
+            voxels,
+            volume_before_percent: percent(part.volume_before),
+            volume_percent: percent(part.volume_after),
+            misclassified_voxels,
+        });
+    }
+    Ok(bodies)
+}
+
+/// The surfaces of other methods beside this one, judged alike.
+fn compare(
+    job: &mut Job,
+    piece: &Piece,
+    smoothed: &Smoothed,
+    params: &Params,
+    args: &Args,
+    memory: u64,
+) -> Result<Vec<Judged>> {
+    if args.compare.is_empty() {
+        return Ok(Vec::new());
+    }
+    let surface = &piece.surface;
+    let spacing = smoothed.spacing;
+    let zero = vec![[0.0; 3]; surface.len()];
+    let mut before = smooth_error::lattice_mesh(surface, [1.0; 3], &zero, &[]);
+    before.triangles = surface.triangles(&before.positions);
+    let own = smooth_error::lattice_mesh(surface, [1.0; 3], smoothed.offsets, smoothed.triangles);
+    let mut all = vec![("smooth-mc", own)];
+    for method in &args.compare {
+        let mesh = match method {
+            Other::Mc => before.clone(),
+            Other::Taubin => {
+                let scaled = |p: &[f64; 3]| [0, 1, 2].map(|a| p[a] * spacing[a]);
+                let at: Vec<[f64; 3]> = before.positions.iter().map(scaled).collect();
+                let (rounds, lambda, mu) = (taubin::ROUNDS, taubin::LAMBDA, taubin::MU);
+                let moved = taubin::taubin(&at, &before.triangles, rounds, lambda, mu);
+                let voxels = moved.iter().map(|p| [0, 1, 2].map(|a| p[a] / spacing[a]));
+                Mesh::from_triangles(voxels.collect(), before.triangles.clone())
+            }
+            Other::Cesn => {
+                let Some(volume) = &piece.volume else {
+                    let problem = "is made from a volume, and this is a mesh";
+                    return Err(Error::parameter("compare", "cesn", problem));
+                };
+                let net = cesn::cesn(
+                    volume,
+                    &piece.inside.select(),
+                    args.border,
+                    params.threshold,
+                    Params::LAPLACIAN_ITERATIONS,
+                    job.progress(),
+                )?;
+                let frame = Frame::straight(volume.frame.dims, [0.0; 3], [1.0; 3]);
+                Mesh::from_triangles(net.positions(&frame), net.triangles)
+            }
+        };
+        all.push((method.name(), mesh));
+    }
+    let voxels = piece.voxels(args.border);
+    let judge = |(name, mesh): &(&'static str, Mesh)| {
+        smooth_error::judge(name, &before, mesh, spacing, voxels, memory, job.progress())
+    };
+    all.iter().map(judge).collect()
+}
+
+/// Smooths a mesh of which nothing is known but the size of a cell: what is left of the method then is
+/// the box around each vertex.
+fn of_any_mesh(
+    job: &mut Job,
+    mesh: Mesh,
+    params: &Params,
+    args: &Args,
+) -> Result<Found<Asked, Stats>> {
+    let Some(spacing) = args.spacing else {
+        let problem = "is needed: the mesh is not one of marching cubes, and shows no grid";
+        return Err(Error::parameter("spacing", "DX,DY,DZ", problem));
+    };
+    let message =
+        "the mesh is not one of marching cubes: voxels are not known, and may change sides";
+    job.warn(vec![Warning::new("no-lattice", message, 1, None)]);
+    let (positions, smoothing) =
+        smooth_mc::smooth_in_boxes(&mesh, spacing, params, job.progress())?;
+    let smooth = Mesh {
+        positions,
+        normals: None,
+        ..mesh.clone()
+    };
+    job.write_mesh(&smooth)?;
+    let stats = Stats::of_any_mesh(&mesh, spacing, smoothing);
+    let summary = stats.summary();
+    let accuracy = stats.accuracy(params);
+    job.write_preview(|_| side_by_side(&mesh, &smooth, &stats));
+    let asked = Asked {
+        inside: Inside::Set,
+        border: args.border,
+        params: *params,
+    };
+    Ok(Found::new(asked, stats, summary)
+        .accuracy(Measures::Many(accuracy))
+        .check("max-error", args.max_error.max_error))
+}
+
+/// Triangles, turned over where that is asked for.
+fn turned(triangles: &[[u32; 3]], over: bool) -> Vec<[u32; 3]> {
+    let turn = |[a, b, c]: &[u32; 3]| if over { [*a, *c, *b] } else { [*a, *b, *c] };
     triangles.iter().map(turn).collect()
 }
 
@@ -378,86 +574,6 @@ fn place(frame: &mut Frame, args: &Args) {
     }
     if let Some(origin) = args.origin {
         frame.origin = origin;
-    }
-}
-
-/// What is inside: what was asked for, else the only value there is beside 0.
-fn inside(volume: &Volume, args: &Args) -> Result<Inside> {
-    if let Some(level) = args.threshold_value {
-        return Ok(Inside::AtLeast(level));
-    }
-    if volume.is_binary() {
-        return Ok(Inside::Set);
-    }
-    let kind = volume.data.sample_type();
-    let found = isosurface::values(volume, MOST_VALUES);
-    let Some(found) = found.filter(|f| f.iter().all(|v| v.fract() == 0.0 && v.abs() < 2e9)) else {
-        let range = volume.range().unwrap_or_default();
-        let problem = format!(
-            "is needed: the voxels are {kind} from {} to {}, amounts rather than labels",
-            range[0], range[1]
-        );
-        return Err(Error::parameter("threshold-value", "V", problem));
-    };
-    let there: Vec<f64> = found.into_iter().filter(|v| *v != 0.0).collect();
-    let missing = |option, value: f64| {
-        let problem = format!("is no label of the volume, which has {}", listed(&there));
-        Error::parameter(option, scantle::error::number(value), problem)
-    };
-    match (args.label, &args.labels) {
-        (Some(label), _) if there.contains(&label) => Ok(Inside::Label(label)),
-        (Some(label), _) => Err(missing("label", label)),
-        (None, Some(Chosen::All)) => Ok(Inside::Labels(there)),
-        (None, Some(Chosen::These(values))) => {
-            if let Some(value) = values.iter().find(|v| !there.contains(v)) {
-                return Err(missing("labels", *value));
-            }
-            let mut values = values.clone();
-            values.sort_by(f64::total_cmp);
-            values.dedup();
-            Ok(Inside::Labels(values))
-        }
-        (None, None) if there.len() > 1 => Err(Error::parameter(
-            "label",
-            "K",
-            format!(
-                "is needed, or --labels or --threshold-value: the volume has {}",
-                listed(&there)
-            ),
-        )),
-        (None, None) => Ok(there
-            .first()
-            .map_or(Inside::Set, |label| Inside::Label(*label))),
-    }
-}
-
-/// Most different values that a volume of labels has.
-const MOST_VALUES: usize = 4096;
-
-/// Most labels that an error names.
-const NAMED: usize = 24;
-
-fn listed(labels: &[f64]) -> String {
-    let names: Vec<String> = labels
-        .iter()
-        .take(NAMED)
-        .map(|l| scantle::error::number(*l))
-        .collect();
-    let more = if labels.len() > NAMED { ", ..." } else { "" };
-    match labels.len() {
-        0 => "no label but 0".to_owned(),
-        1 => format!("the label {}", names[0]),
-        n => format!("{n} labels: {}{more}", names.join(", ")),
-    }
-}
-
-impl Inside {
-    fn select(&self) -> Select {
-        match self {
-            Inside::Label(label) => Select::Equal(*label),
-            Inside::AtLeast(level) => Select::AtLeast(*level),
-            Inside::Set | Inside::Labels(_) => Select::Set,
-        }
     }
 }
 
@@ -480,126 +596,20 @@ pub fn modelled(surface: &Surface, dims: [usize; 3]) -> Modelled {
     Modelled::new("cells", surface.cells, full, surface.bytes())
 }
 
-impl Stats {
-    fn new(
-        surface: &Surface,
-        frame: &Frame,
-        smoothing: smooth_mc::Stats,
-        labels: Vec<Body>,
-        verified: Option<SmoothError>,
-        offsets: &[[f64; 3]],
-        triangles: usize,
-    ) -> Self {
-        let spacing = frame.spacing();
-        let smallest = spacing.iter().copied().fold(f64::INFINITY, f64::min);
-        let way = |o: &[f64; 3]| length([0, 1, 2].map(|a| o[a] * spacing[a] / smallest));
-        let distance = match &verified {
-            Some(found) => found.hausdorff_bound,
-            None => offsets.iter().map(way).fold(0.0, f64::max),
-        };
-        let percent = |of: Option<f64>| Some(100.0 * smoothing.volume_after? / of?);
-        Stats {
-            vertices: surface.len() as u64,
-            triangles: triangles as u64,
-            spacing,
-            origin: frame.origin,
-            volume_percent: percent(smoothing.volume_before),
-            voxel_volume_percent: percent(smoothing.voxels.map(|v| v as f64)),
-            hausdorff: Hausdorff {
-                cell_diagonals: distance * smallest / length(spacing),
-                voxels: distance,
-                measured: verified.is_some(),
-            },
-            smoothing,
-            labels,
-            verified,
-        }
-    }
-
-    fn summary(&self) -> String {
-        let turning = [
-            self.smoothing.turning_before_deg,
-            self.smoothing.turning_after_deg,
-        ];
-        format!(
-            "{} vertices, {} triangles; chords turn by {:.1} degrees, {:.1} before; {} steps",
-            self.vertices, self.triangles, turning[1], turning[0], self.smoothing.iterations
-        )
-    }
-
-    /// Voxels on the wrong side, of all labels.
-    fn misclassified(&self) -> Option<u64> {
-        if self.labels.is_empty() {
-            return self.verified.as_ref()?.misclassified_voxels;
-        }
-        self.labels
-            .iter()
-            .map(|body| body.misclassified_voxels)
-            .sum()
-    }
-
-    /// A voxel on the wrong side, where the constraint rules that out.
-    fn wrong(&self, params: &Params) -> Option<String> {
-        let count = self
-            .misclassified()
-            .filter(|n| *n > 0 && params.constraint.is_faithful())?;
-        Some(format!("{count} voxels changed sides"))
-    }
-
-    fn accuracy(&self, params: &Params) -> Vec<Accuracy> {
-        let measure = |measure: &str, unit: &str, bound, reached: Option<f64>, by: &str| Accuracy {
-            measure: measure.to_owned(),
-            unit: unit.to_owned(),
-            bound,
-            reached,
-            reference: by.to_owned(),
-            verified: reached.is_some(),
-        };
-        let verified = self.verified.as_ref();
-        let off = self.smoothing.volume_after.zip(self.smoothing.voxels);
-        vec![
-            measure(
-                smooth_mc::TRADE.error.name,
-                smooth_mc::TRADE.error.unit,
-                None,
-                verified.map(|v| v.from_fairest),
-                smooth_mc::TRADE.reference,
-            ),
-            measure(
-                "voxels on another side",
-                "voxel",
-                params.constraint.is_faithful().then_some(0.0),
-                self.misclassified().map(|n| n as f64),
-                "a voxelization of the result",
-            ),
-            measure(
-                "largest distance to the surface of marching cubes",
-                "voxel",
-                Some(self.hausdorff.voxels),
-                verified.map(|v| v.hausdorff),
-                "marching cubes",
-            ),
-            measure(
-                "volume enclosed",
-                "share of the voxels'",
-                None,
-                off.map(|(after, voxels)| (after / voxels as f64 - 1.0).abs())
-                    .filter(|share| share.is_finite()),
-                "the volume of the voxels",
-            ),
-        ]
-    }
+/// The surface of marching cubes, and beside it the smooth one.
+fn picture(piece: &Piece, smooth: &Mesh, stats: &Stats) -> Result<Vec<u8>> {
+    let before = Mesh::from_triangles(
+        piece.positions(&vec![[0.0; 3]; piece.surface.len()]),
+        smooth.triangles.clone(),
+    );
+    side_by_side(&before, smooth, stats)
 }
 
-/// The surface of marching cubes, and beside it the smooth one.
-fn picture(surface: &Surface, frame: &Frame, smooth: &Mesh, stats: &Stats) -> Result<Vec<u8>> {
-    let positions = surface.positions(frame, |_| [0.0; 3]);
-    let triangles = turned(&surface.triangles(&positions), frame.is_mirrored());
-    let before = Mesh::from_triangles(positions, triangles);
+fn side_by_side(before: &Mesh, smooth: &Mesh, stats: &Stats) -> Result<Vec<u8>> {
     let panels = [
         Panel {
             label: "marching cubes",
-            what: What::Mesh(&before),
+            what: What::Mesh(before),
             colour: CLAY,
         },
         Panel {
@@ -608,13 +618,9 @@ fn picture(surface: &Surface, frame: &Frame, smooth: &Mesh, stats: &Stats) -> Re
             colour: OKABE_ITO[2],
         },
     ];
-    let caption = format!(
-        "chords turn by {:.1}°, {:.1}° before",
-        stats.smoothing.turning_after_deg, stats.smoothing.turning_before_deg
-    );
     let params = preview::Params {
         up: preview::Up::Z,
         ..preview::Params::DEFAULT
     };
-    preview::side_by_side(&panels, &caption, "", &params)
+    preview::side_by_side(&panels, &stats.turned(), "", &params)
 }

@@ -22,19 +22,53 @@ pub fn on_wrong_side(
     if mesh.triangles.is_empty() {
         return Ok(inside.count());
     }
-    let dims = inside.dims();
-    let end = dims.map(|n| n as f64 - 0.5);
+    let end = inside.dims().map(|n| n as f64 - 0.5);
+    let bounds = [-0.5, -0.5, -0.5, end[0], end[1], end[2]];
+    let found = filled(mesh, bounds, max_memory, progress)?;
+    Ok(differing(inside, &found))
+}
+
+/// Number of voxels that two closed meshes have on different sides, the first around all that is inside.
+///
+/// Both are in voxels, as in [`on_wrong_side`], and the second within half a voxel of the first.
+pub fn on_other_side(
+    before: &Mesh,
+    after: &Mesh,
+    max_memory: u64,
+    progress: &dyn Progress,
+) -> Result<u64> {
+    if before.triangles.is_empty() {
+        return Ok(0);
+    }
+    let around = before.used_bounds();
+    let lo = around.lo.map(|c| c.floor() - 0.5);
+    let hi = around.hi.map(|c| c.ceil() + 0.5);
+    let bounds = [lo[0], lo[1], lo[2], hi[0], hi[1], hi[2]];
+    let inside = filled(before, bounds, max_memory, progress)?;
+    let found = filled(after, bounds, max_memory, progress)?;
+    match &inside.data {
+        Data::Bits(bits) => Ok(differing(bits, &found)),
+        _ => Ok(0),
+    }
+}
+
+/// The voxels inside of a mesh, by the parity of crossings.
+fn filled(
+    mesh: &Mesh,
+    bounds: [f64; 6],
+    max_memory: u64,
+    progress: &dyn Progress,
+) -> Result<Volume> {
     let params = Params {
         size: Size::VoxelSize(1.0),
         mode: Mode::None,
         fill: Fill::Parity,
-        bounds: Some([-0.5, -0.5, -0.5, end[0], end[1], end[2]]),
+        bounds: Some(bounds),
         grid: Storage::Dense,
         max_memory,
         ..Params::DEFAULT
     };
-    let (found, _) = voxelize::voxelize(mesh, &params, progress)?;
-    Ok(differing(inside, &found))
+    Ok(voxelize::voxelize(mesh, &params, progress)?.0)
 }
 
 fn differing(inside: &BitGrid, found: &Volume) -> u64 {

@@ -1,15 +1,16 @@
 //! How faithful a smoothed surface is, and how far from the fairest one.
 
 use super::mesh_distance;
-use super::sides::on_wrong_side;
+use super::sides::{on_other_side, on_wrong_side};
 use crate::error::Result;
 use crate::mesh::Mesh;
 use crate::numeric::sums::sum_by;
-use crate::numeric::vector::{Vec3, add, cross, dot, normalize, sub};
+use crate::numeric::vector::{Vec3, add, cross, dot, length, normalize, sub};
 use crate::progress::Progress;
 use crate::volume::bits::BitGrid;
 use crate::volume::isosurface::Surface;
 use crate::volume::smooth_mc::{Params, smooth, turning};
+use rayon::prelude::*;
 use schemars::JsonSchema;
 use serde::Serialize;
 
@@ -33,7 +34,8 @@ pub struct SmoothError {
     pub from_fairest: f64,
     /// Root mean square of the angle between chords of the curves in which the fairest surface meets the planes of voxel
     /// centres, in degrees.
-    pub fairest_turning_deg: f64,
+    /// Null where there is no curve.
+    pub fairest_turning_deg: Option<f64>,
 }
 
 /// A surface in voxels, in units of the smallest spacing.
@@ -50,39 +52,88 @@ pub fn lattice_mesh(
     Mesh::from_triangles(positions, triangles.to_vec())
 }
 
+/// What the voxels of a surface are known from.
+#[derive(Debug, Clone, Copy)]
+pub enum Voxels<'a> {
+    /// They are given.
+    Given(&'a BitGrid),
+    /// They are what the surface of marching cubes encloses.
+    Enclosed,
+    /// The surface is open, or has several insides.
+    Unknown,
+}
+
+/// A smoothed surface, in voxels.
+#[derive(Debug, Clone, Copy)]
+pub struct Smoothed<'a> {
+    /// What was smoothed.
+    pub surface: &'a Surface,
+    /// Lengths of the steps of its grid.
+    pub spacing: Vec3,
+    /// The way of each vertex, in voxels.
+    pub offsets: &'a [Vec3],
+    /// Its triangles.
+    pub triangles: &'a [[u32; 3]],
+}
+
+impl Smoothed<'_> {
+    fn metric(&self) -> Vec3 {
+        let smallest = self.spacing.iter().copied().fold(f64::INFINITY, f64::min);
+        self.spacing.map(|s| s / smallest)
+    }
+
+    /// The surface as it was, and the smoothed one, in voxels times `metric`.
+    fn meshes(&self, metric: Vec3) -> [Mesh; 2] {
+        let zero = vec![[0.0; 3]; self.surface.len()];
+        let mut before = lattice_mesh(self.surface, metric, &zero, &[]);
+        before.triangles = self.surface.triangles(&before.positions);
+        let after = lattice_mesh(self.surface, metric, self.offsets, self.triangles);
+        [before, after]
+    }
+
+    /// Number of voxels whose centres lie on another side than they belong, if that can be known.
+    ///
+    /// Errs as voxelizing does.
+    pub fn misclassified(
+        &self,
+        voxels: Voxels,
+        max_memory: u64,
+        progress: &dyn Progress,
+    ) -> Result<Option<u64>> {
+        progress.stage("voxelize", 0);
+        let after = || lattice_mesh(self.surface, [1.0; 3], self.offsets, self.triangles);
+        match voxels {
+            Voxels::Given(inside) => {
+                on_wrong_side(inside, &after(), max_memory, progress).map(Some)
+            }
+            Voxels::Enclosed => {
+                let [before, after] = self.meshes([1.0; 3]);
+                on_other_side(&before, &after, max_memory, progress).map(Some)
+            }
+            Voxels::Unknown => Ok(None),
+        }
+    }
+}
+
 /// Measures what [`smooth`] made of a surface.
 ///
-/// `inside` are the voxels of the volume, where they are known and the surface is closed. Errs as
-/// voxelizing and comparing meshes do. Cost: a thousand steps of smoothing, a filled grid, and distances
-/// between meshes.
+/// Errs as voxelizing and comparing meshes do. Cost: a thousand steps of smoothing, a filled grid, and
+/// distances between meshes.
 pub fn measure(
-    surface: &Surface,
-    spacing: Vec3,
-    inside: Option<&BitGrid>,
-    offsets: &[Vec3],
-    triangles: &[[u32; 3]],
+    smoothed: &Smoothed,
+    voxels: Voxels,
     max_memory: u64,
     progress: &dyn Progress,
 ) -> Result<SmoothError> {
-    let smallest = spacing.iter().copied().fold(f64::INFINITY, f64::min);
-    let metric = spacing.map(|s| s / smallest);
-    let misclassified_voxels = inside
-        .map(|inside| misclassified(surface, inside, offsets, triangles, max_memory, progress))
-        .transpose()?;
+    let misclassified_voxels = smoothed.misclassified(voxels, max_memory, progress)?;
+    let (surface, metric) = (smoothed.surface, smoothed.metric());
     progress.stage("distance", 0);
-    let (hausdorff, hausdorff_bound) = if triangles.is_empty() {
+    let (hausdorff, hausdorff_bound) = if smoothed.triangles.is_empty() {
         (0.0, 0.0)
     } else {
-        let zero = vec![[0.0; 3]; surface.len()];
-        let before = lattice_mesh(
-            surface,
-            metric,
-            &zero,
-            &surface.triangles(&lattice_mesh(surface, metric, &zero, &[]).positions),
-        );
-        let after = lattice_mesh(surface, metric, offsets, triangles);
-        let found =
-            mesh_distance::compare(&before, &after, &mesh_distance::Params::DEFAULT, progress)?;
+        let [before, after] = smoothed.meshes(metric);
+        let params = mesh_distance::Params::DEFAULT;
+        let found = mesh_distance::compare(&before, &after, &params, progress)?;
         (found.hausdorff, found.hausdorff_bound)
     };
     let fairest = Params {
@@ -90,11 +141,11 @@ pub fn measure(
         max_iterations: FAIREST_STEPS,
         ..Params::DEFAULT
     };
-    let (best, split, _) = smooth(surface, None, spacing, &fairest, progress)?;
+    let (best, split, _) = smooth(surface, None, smoothed.spacing, &fairest, progress)?;
     let normals = normals(&lattice_mesh(surface, metric, &best, &split));
     let ways: Vec<f64> = (0..surface.len())
         .map(|v| {
-            let d = sub(offsets[v], best[v]);
+            let d = sub(smoothed.offsets[v], best[v]);
             dot(std::array::from_fn(|a| d[a] * metric[a]), normals[v])
         })
         .collect();
@@ -108,18 +159,93 @@ pub fn measure(
     })
 }
 
-/// Number of voxels whose centres these triangles, which close, have on another side than they belong.
-pub fn misclassified(
-    surface: &Surface,
-    inside: &BitGrid,
-    offsets: &[Vec3],
-    triangles: &[[u32; 3]],
+/// What any surface of a volume is judged by, whoever made it.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct Judged {
+    /// Who made it.
+    pub method: &'static str,
+    /// Its triangles.
+    pub triangles: u64,
+    /// What it encloses, in percent of what marching cubes encloses.
+    pub volume_percent: Option<f64>,
+    /// Voxels whose centres lie on another side than they belong.
+    pub misclassified_voxels: Option<u64>,
+    /// Largest distance between it and the surface of marching cubes, both ways, in diagonals of a cell.
+    pub hausdorff_cell_diagonals: f64,
+    /// Mean angle between triangles at an edge, in degrees.
+    pub dihedral_mean_deg: f64,
+}
+
+/// Judges a surface in voxels against that of marching cubes.
+///
+/// Errs and costs as [`measure`] does without the smoothing.
+pub fn judge(
+    method: &'static str,
+    marching_cubes: &Mesh,
+    mesh: &Mesh,
+    spacing: Vec3,
+    voxels: Voxels,
     max_memory: u64,
     progress: &dyn Progress,
-) -> Result<u64> {
-    progress.stage("voxelize", 0);
-    let in_voxels = lattice_mesh(surface, [1.0; 3], offsets, triangles);
-    on_wrong_side(inside, &in_voxels, max_memory, progress)
+) -> Result<Judged> {
+    progress.stage("judge", 0);
+    let smallest = spacing.iter().copied().fold(f64::INFINITY, f64::min);
+    let scaled = |mesh: &Mesh| {
+        let at = |p: &Vec3| std::array::from_fn(|a| p[a] * spacing[a] / smallest);
+        let positions = mesh.positions.iter().map(at).collect();
+        Mesh::from_triangles(positions, mesh.triangles.clone())
+    };
+    let (before, after) = (scaled(marching_cubes), scaled(mesh));
+    let misclassified_voxels = match voxels {
+        Voxels::Given(inside) => Some(on_wrong_side(inside, mesh, max_memory, progress)?),
+        Voxels::Enclosed => Some(on_other_side(marching_cubes, mesh, max_memory, progress)?),
+        Voxels::Unknown => None,
+    };
+    let mut judged = Judged {
+        method,
+        triangles: mesh.triangles.len() as u64,
+        volume_percent: None,
+        misclassified_voxels,
+        hausdorff_cell_diagonals: 0.0,
+        dihedral_mean_deg: dihedral_mean_deg(&after),
+    };
+    if !before.triangles.is_empty() && !after.triangles.is_empty() {
+        let params = mesh_distance::Params::DEFAULT;
+        let found = mesh_distance::compare(&before, &after, &params, progress)?;
+        let volumes = found.a.volume.zip(found.b.volume);
+        judged.volume_percent = volumes.map(|(a, b)| 100.0 * b / a);
+        judged.hausdorff_cell_diagonals = found.hausdorff * smallest / length(spacing);
+    }
+    Ok(judged)
+}
+
+/// Mean angle between the triangles at each edge that two of them share, in degrees; 0 without such.
+fn dihedral_mean_deg(mesh: &Mesh) -> f64 {
+    let mut sides: Vec<([u32; 2], u32)> = Vec::with_capacity(3 * mesh.triangles.len());
+    for (t, corners) in mesh.triangles.iter().enumerate() {
+        for i in 0..3 {
+            let (a, b) = (corners[i], corners[(i + 1) % 3]);
+            sides.push(([a.min(b), a.max(b)], t as u32));
+        }
+    }
+    sides.par_sort_unstable();
+    let normal = |t: u32| {
+        let [a, b, c] = mesh.corners(t as usize);
+        cross(sub(b, a), sub(c, a))
+    };
+    let (mut sum, mut count) = (0.0, 0u64);
+    for pair in sides.chunk_by(|a, b| a.0 == b.0) {
+        if let [(_, s), (_, t)] = pair {
+            let (m, n) = (normal(*s), normal(*t));
+            sum += length(cross(m, n)).atan2(dot(m, n));
+            count += 1;
+        }
+    }
+    if count == 0 {
+        0.0
+    } else {
+        (sum / count as f64).to_degrees()
+    }
 }
 
 fn normals(mesh: &Mesh) -> Vec<Vec3> {

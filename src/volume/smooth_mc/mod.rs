@@ -29,12 +29,14 @@ mod tests;
 mod trade;
 
 use crate::error::{Error, Result};
+use crate::mesh::Mesh;
 use crate::numeric::sums::sum_by;
 use crate::numeric::vector::{Vec3, dot, sub};
 use crate::progress::Progress;
 use crate::trade::named;
+use crate::volume::Volume;
 use crate::volume::isosurface::cases::step_of;
-use crate::volume::isosurface::{NONE, Surface, axis_of};
+use crate::volume::isosurface::{Border, Loops, NONE, Select, Surface, axis_of, inside};
 use fair::Fair;
 use parts::Parts;
 use rayon::prelude::*;
@@ -195,9 +197,10 @@ pub struct Stats {
     pub vanishing: u64,
     /// Root mean square of the angle between chords of the curves in which the surface of marching cubes meets the planes of
     /// voxel centres, in degrees.
-    pub turning_before_deg: f64,
+    /// Null where there is no curve.
+    pub turning_before_deg: Option<f64>,
     /// The same of the smooth surface.
-    pub turning_after_deg: f64,
+    pub turning_after_deg: Option<f64>,
     /// All parts, or where there are labels, all labels, that of the rest first.
     #[serde(skip)]
     pub parts: Vec<Component>,
@@ -289,7 +292,11 @@ fn placed(surface: &Surface, metric: Vec3, offset: impl Fn(usize) -> Vec3 + Sync
 ///
 /// `metric` is the spacing over the smallest one, `offset` in voxels. 0 where there is no curve. The mean
 /// is taken of the squared distances between the directions, which needs no angle of each.
-pub fn turning(surface: &Surface, metric: Vec3, offset: impl Fn(usize) -> Vec3 + Sync) -> f64 {
+pub fn turning(
+    surface: &Surface,
+    metric: Vec3,
+    offset: impl Fn(usize) -> Vec3 + Sync,
+) -> Option<f64> {
     let chord = |v: usize, slot: usize| {
         let step = step_of(surface.steps[v][slot]);
         let d = sub(offset((surface.links[v][slot] >> 2) as usize), offset(v));
@@ -308,14 +315,107 @@ pub fn turning(surface: &Surface, metric: Vec3, offset: impl Fn(usize) -> Vec3 +
     let curves = |v: usize| (0..2).filter(move |c| !surface.links[v][2 * c..][..2].contains(&NONE));
     let squares = sum_by(&vertices, |v| curves(*v).map(|c| square(v, c)).sum());
     let count = sum_by(&vertices, |v| curves(*v).count() as f64);
-    if count > 0.0 {
-        2.0 * (0.5 * (squares / count).sqrt())
-            .min(1.0)
-            .asin()
-            .to_degrees()
-    } else {
-        0.0
+    let mean = 0.5 * (squares / count).sqrt();
+    (count > 0.0).then(|| 2.0 * mean.min(1.0).asin().to_degrees())
+}
+
+/// Any mesh, each vertex to the mean of its neighbours within the box of a voxel around its first place:
+/// what [`Constraint::CellSize`] is where no grid is known.
+///
+/// Returns the positions; the figures that need a grid are null or 0. Vertices at the end of the mesh move
+/// by their neighbours there alone. Cost: as [`smooth`].
+pub fn smooth_in_boxes(
+    mesh: &Mesh,
+    spacing: Vec3,
+    params: &Params,
+    progress: &dyn Progress,
+) -> Result<(Vec<Vec3>, Stats)> {
+    params.check()?;
+    progress.stage("smooth", u64::from(params.max_iterations));
+    let (positions, outcome) = relax::in_boxes(mesh, spacing, params, &|| progress.advance(1));
+    let nothing = Surface::default();
+    let parts = Parts::find(&nothing);
+    let mut stats = stats(
+        &nothing,
+        params,
+        &outcome,
+        &[],
+        &parts,
+        [&vec![], &vec![]],
+        [None; 2],
+    );
+    let way = |(a, b): (&Vec3, &Vec3)| {
+        let d = sub(*a, *b);
+        (0..3)
+            .map(|axis| (d[axis] / spacing[axis]).abs())
+            .fold(0.0, f64::max)
+    };
+    stats.max_displacement = positions
+        .iter()
+        .zip(&mesh.positions)
+        .map(way)
+        .fold(0.0, f64::max);
+    stats.awake_share = 1.0;
+    (stats.voxels, stats.volume_before, stats.volume_after) = (None, None, None);
+    Ok((positions, stats))
+}
+
+/// The dual surface, which has a vertex in each cell, relaxed within the cells: constrained elastic
+/// surface nets, for [`Constraint::CellCenter`].
+///
+/// Returns what [`extract`](crate::volume::isosurface::extract) and [`smooth`] do; the surface has no
+/// curves. Errs and costs as [`cesn::cesn`].
+pub fn smooth_net(
+    volume: &Volume,
+    select: &Select,
+    border: Border,
+    params: &Params,
+    progress: &dyn Progress,
+) -> Result<(Surface, Vec<Vec3>, Vec<[u32; 3]>, Stats)> {
+    params.check()?;
+    let steps = (params.threshold, params.max_iterations);
+    let net = cesn::cesn(volume, select, border, steps.0, steps.1, progress)?;
+    let n = net.places.len();
+    let surface = Surface {
+        places: net.places,
+        lower_inside: vec![false; n],
+        thin: vec![false; n],
+        links: vec![[NONE; 4]; n],
+        steps: vec![[0; 4]; n],
+        loops: Loops {
+            lengths: vec![3; net.triangles.len()],
+            corners: net.triangles.as_flattened().to_vec(),
+        },
+        cells: n as u64,
+        ..Surface::default()
+    };
+    let outcome = Outcome {
+        iterations: net.iterations,
+        updates: n as u64 * u64::from(net.iterations),
+        last_step: net.last_step,
+        stop: net.stop,
+    };
+    let parts = Parts::find(&surface);
+    let before = parts.enclosed_by(&surface, &net.triangles, |_| [0.0; 3]);
+    let after = parts.enclosed_by(&surface, &net.triangles, |v| net.offsets[v]);
+    let volumes = [&before, &after];
+    let mut stats = stats(
+        &surface,
+        params,
+        &outcome,
+        &net.offsets,
+        &parts,
+        volumes,
+        [None; 2],
+    );
+    for part in stats.largest.iter_mut().chain(&mut stats.parts) {
+        part.voxels = None;
     }
+    let closed = border == Border::Closed;
+    stats.voxels = closed.then(|| inside(volume, select).count() as i64);
+    stats.volume_before = closed.then(|| before.iter().sum());
+    stats.volume_after = closed.then(|| after.iter().sum());
+    Ok((surface, net.offsets, net.triangles, stats))
 }
 
 /// Where a vertex may go.
@@ -364,7 +464,7 @@ fn stats(
     offsets: &[Vec3],
     parts: &Parts,
     [before, after]: [&Vec<f64>; 2],
-    [turning_before_deg, turning_after_deg]: [f64; 2],
+    [turning_before_deg, turning_after_deg]: [Option<f64>; 2],
 ) -> Stats {
     let n = surface.len() as u64;
     let mut listed: Vec<Component> = (0..parts.len())
@@ -393,7 +493,9 @@ fn stats(
         .all(Option::is_some);
     let sum = |of: &[f64]| closed.then(|| of[labels.min(of.len())..].iter().sum());
     let way = |v: &Vec3| match params.constraint {
-        Constraint::CellSize => v.iter().fold(0.0, |m: f64, c| m.max(c.abs())),
+        Constraint::CellSize | Constraint::CellCenter => {
+            v.iter().fold(0.0, |m: f64, c| m.max(c.abs()))
+        }
         _ => v.iter().map(|c| c.abs()).sum(),
     };
     Stats {

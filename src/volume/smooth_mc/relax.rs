@@ -3,6 +3,7 @@
 use super::neighbours::Neighbours;
 use super::region::Region;
 use super::{Outcome, Params, Stop, Update};
+use crate::mesh::Mesh;
 use crate::numeric::vector::{Vec3, add, length, scale, sub};
 use crate::volume::isosurface::{NONE, Surface};
 use rayon::prelude::*;
@@ -132,4 +133,75 @@ impl<'a> Relax<'a> {
         }
         (self.regions)(v).clip(scale(sum, 1.0 / near.len() as f64))
     }
+}
+
+/// Any mesh in boxes of `spacing` around its vertices; see [`super::smooth_in_boxes`].
+pub(super) fn in_boxes(
+    mesh: &Mesh,
+    spacing: Vec3,
+    params: &Params,
+    advance: &(dyn Fn() + Sync),
+) -> (Vec<Vec3>, Outcome) {
+    let first = &mesh.positions;
+    let ends = ends_of(&mesh.triangles, first.len());
+    let neighbours = Neighbours::new(
+        first.len(),
+        &mesh.triangles,
+        |w| w,
+        |v, w| !ends[v as usize] || ends[w as usize],
+    );
+    let smallest = spacing.iter().copied().fold(f64::INFINITY, f64::min);
+    let mut at = first.clone();
+    let mut outcome = Outcome::default();
+    for _ in 0..params.max_iterations {
+        let target = |v: usize| {
+            let near = neighbours.of(v);
+            if near.is_empty() {
+                return at[v];
+            }
+            // From the first place, so that far from the origin nothing is lost.
+            let ways = near.iter().map(|w| sub(at[*w as usize], first[v]));
+            let mean = scale(ways.fold([0.0; 3], add), 1.0 / near.len() as f64);
+            let kept = |a: usize| {
+                let reach = 0.5 * params.scale * spacing[a];
+                mean[a].clamp(-reach, reach)
+            };
+            add(first[v], [kept(0), kept(1), kept(2)])
+        };
+        let next: Vec<Vec3> = (0..at.len())
+            .into_par_iter()
+            .with_min_len(CHUNK)
+            .map(target)
+            .collect();
+        let ways = next.iter().zip(&at).map(|(a, b)| length(sub(*a, *b)));
+        outcome.last_step = ways.fold(0.0, f64::max) / smallest;
+        outcome.iterations += 1;
+        outcome.updates += at.len() as u64;
+        at = next;
+        advance();
+        if outcome.last_step < params.threshold {
+            outcome.stop = Stop::Threshold;
+            break;
+        }
+    }
+    (at, outcome)
+}
+
+/// Whether each vertex lies on an edge of one triangle alone.
+fn ends_of(triangles: &[[u32; 3]], vertices: usize) -> Vec<bool> {
+    let mut sides: Vec<[u32; 2]> = triangles
+        .iter()
+        .flat_map(|t| (0..3).map(|i| [t[i], t[(i + 1) % 3]]))
+        .map(|[a, b]| [a.min(b), a.max(b)])
+        .collect();
+    sides.par_sort_unstable();
+    let mut ends = vec![false; vertices];
+    for same in sides.chunk_by(|a, b| a == b) {
+        if same.len() == 1 {
+            for v in same[0] {
+                ends[v as usize] = true;
+            }
+        }
+    }
+    ends
 }
