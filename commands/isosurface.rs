@@ -40,9 +40,8 @@ pub struct Args {
 
 const AFTER: &str = "\
 Examples:
-  scantle isosurface fixtures/volumes/ball-f32.nrrd --iso 0 -o ball.ply
-  scantle voxelize fixtures/shapes/torus.obj -q -o - --output-format nrrd --report torus.json |
-    scantle isosurface - --border closed -o torus.ply
+  scantle isosurface fixtures/volumes/ball.nrrd --iso 0 -o ball.ply
+  scantle isosurface fixtures/volumes/ball.mha --iso 0.25 --border closed -o inner.stl
 ";
 
 /// What was asked for.

@@ -111,8 +111,8 @@ The first measure of `accuracy`, which --max-error checks, is the distance to th
 there is in the diamond, which --verify looks for with a thousand steps.
 
 Examples:
-  scantle smooth-mc fixtures/volumes/labels.nii.gz --label 1 -o one.ply --preview one.png
-  scantle smooth-mc fixtures/volumes/labels.nii.gz --labels all -o 'label-{label}.ply' --verify
+  scantle smooth-mc fixtures/volumes/labels.nii --label 1 -o one.ply --preview one.png
+  scantle smooth-mc fixtures/volumes/labels.nii --labels all -o label-{label}.ply --verify
 ";
 
 /// A method to compare with.

@@ -8,6 +8,8 @@ use scantle::io::sink::Sink;
 use scantle::io::source::Source;
 use scantle::io::{read_mesh, write_mesh, write_volume};
 use scantle::mesh::{Mesh, shapes};
+use scantle::progress::Silent;
+use scantle::volume::isosurface::{Border, Select, at_level, axis_of, extract};
 use scantle::volume::{Data, Frame, Volume};
 use std::fs;
 
@@ -30,6 +32,8 @@ const MESHES: &[Row<Mesh>] = &[
     ("shapes/torus-knot.ply", || {
         shapes::torus_knot(2, 3, 0.4, 160, 24)
     }),
+    ("shapes/staircase.ply", || marching_cubes(false)),
+    ("shapes/grey.ply", || marching_cubes(true)),
     ("shapes/points.ply", || Mesh {
         points: (0..96).collect(),
         ..helix(96)
@@ -43,6 +47,16 @@ const MESHES: &[Row<Mesh>] = &[
 const VOLUMES: &[Row<Volume>] = &[
     ("volumes/ball.nrrd", || ball(16)),
     ("volumes/ball.mha", || ball(16)),
+    ("volumes/labels.nii", labels),
+    ("volumes/nothing.npy", || of_values(|_| 0)),
+    ("volumes/not-a-number.npy", || Volume {
+        data: Data::F32(
+            (0..64)
+                .map(|i| if i == 21 { f32::NAN } else { i as f32 })
+                .collect(),
+        ),
+        ..of_values(|_| 0)
+    }),
 ];
 
 /// Vertices along three turns of a helix: radius 1, height 1.5, 32 to a turn.
@@ -73,6 +87,63 @@ fn ball(n: usize) -> Volume {
         frame,
         data: Data::F32(samples.collect()),
     }
+}
+
+/// Two halves of a ball that touch (1 and 3), a plate of one voxel that stands in both (4), a voxel of
+/// its own (7) and a rod (9); voxels are not cubes, and the grid is not at the origin.
+fn labels() -> Volume {
+    let dims = [24, 22, 18];
+    let value = |i: usize| {
+        let [x, y, z] = [i % dims[0], i / dims[0] % dims[1], i / dims[0] / dims[1]];
+        let [dx, dy, dz] = [x as f64 - 10.2, y as f64 - 10.7, 1.5 * (z as f64 - 8.4)];
+        if [x, y, z] == [21, 3, 3] {
+            7
+        } else if y == 1 && z == 15 && (2..22).contains(&x) {
+            9
+        } else if z == 8 && y > 4 && x > 4 && x < 22 {
+            4
+        } else if dx * dx + dy * dy + dz * dz > 64.0 {
+            0
+        } else if dx + 0.3 * dy < 0.0 {
+            1
+        } else {
+            3
+        }
+    };
+    Volume {
+        frame: Frame::straight(dims, [10.0, -4.0, 2.0], [0.5, 0.5, 0.75]),
+        data: Data::U8((0..dims.iter().product()).map(value).collect()),
+    }
+}
+
+/// A cube of four voxels along each side.
+fn of_values(value: impl Fn(usize) -> u8) -> Volume {
+    Volume {
+        frame: Frame::straight([4; 3], [0.0; 3], [1.0; 3]),
+        data: Data::U8((0..64).map(value).collect()),
+    }
+}
+
+/// The surface of marching cubes around label 1 of [`labels`], or where [`ball`] is 0.
+fn marching_cubes(grey: bool) -> Mesh {
+    let (volume, select) = if grey {
+        (ball(16), Select::AtLeast(0.0))
+    } else {
+        (labels(), Select::Equal(1.0))
+    };
+    let surface = extract(&volume, &select, Border::Closed, &Silent).expect("a surface");
+    let along = if grey {
+        at_level(&volume, &surface, 0.0)
+    } else {
+        vec![0.0; surface.len()]
+    };
+    let positions = surface.positions(&volume.frame, |v| {
+        let mut offset = [0.0; 3];
+        offset[axis_of(surface.places[v])] = along[v];
+        offset
+    });
+    let triangles = surface.triangles(&positions);
+    Mesh::from_triangles(positions, triangles)
 }
 
 /// Whether two files are the same, or hold meshes that differ by the roundings of single precision.

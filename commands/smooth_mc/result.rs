@@ -144,7 +144,9 @@ impl Stats {
     ) -> Self {
         if let Some(found) = &verified {
             let smallest = self.spacing.iter().copied().fold(f64::INFINITY, f64::min);
-            self.hausdorff = Hausdorff::new(found.hausdorff_bound * smallest, self.spacing, true);
+            // No point goes farther than the vertices of its triangle.
+            let most = found.hausdorff_bound.min(self.hausdorff.voxels);
+            self.hausdorff = Hausdorff::new(most * smallest, self.spacing, true);
         }
         Stats {
             labels,
@@ -158,14 +160,14 @@ impl Stats {
     pub fn summary(&self) -> String {
         let (vertices, triangles) = (self.vertices, self.triangles);
         let (steps, turned) = (self.smoothing.iterations, self.turned());
-        format!("{vertices} vertices, {triangles} triangles, {steps} steps{turned}")
+        format!("{vertices} vertices, {triangles} triangles, {steps} steps; {turned}")
     }
 
     /// How far the staircase went, in words.
     pub fn turned(&self) -> String {
         let turning = (self.smoothing.turning_before_deg).zip(self.smoothing.turning_after_deg);
-        turning.map_or(String::new(), |(before, after)| {
-            format!("; slices turn by {after:.1}°, {before:.1}° before")
+        turning.map_or("no slices".to_owned(), |(before, after)| {
+            format!("slices turn by {after:.1}°, {before:.1}° before")
         })
     }
 

@@ -260,3 +260,70 @@ fn normals(mesh: &Mesh) -> Vec<Vec3> {
     }
     normals.into_iter().map(normalize).collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::progress::Silent;
+    use crate::volume::isosurface::{Border, Select, extract, inside};
+    use crate::volume::smooth_mc::Energy;
+    use crate::volume::smooth_mc::region::Constraint;
+    use crate::volume::{Data, Frame, Volume};
+
+    /// The paper's sphere: the distances of its figure 7.
+    #[test]
+    fn the_sphere_stays_as_near_as_in_the_paper() {
+        let n = 64;
+        let value = |i: usize| {
+            let at = [i % n, i / n % n, i / n / n].map(|c| c as f64 - 31.5);
+            u8::from(dot(at, at) <= 900.0)
+        };
+        let volume = Volume {
+            frame: Frame::straight([n; 3], [0.0; 3], [1.0; 3]),
+            data: Data::U8((0..n * n * n).map(value).collect()),
+        };
+        let surface = extract(&volume, &Select::Set, Border::Closed, &Silent).expect("a surface");
+        let bits = inside(&volume, &Select::Set);
+        for (constraint, lowest, highest) in [
+            (Constraint::Diamond, 0.23, 0.25),
+            (Constraint::CellEdge, 0.28, 0.2887),
+            (Constraint::CellSize, 0.49, 0.5),
+        ] {
+            let params = Params {
+                constraint,
+                energy: Energy::Laplacian,
+                max_iterations: Params::LAPLACIAN_ITERATIONS,
+                ..Params::DEFAULT
+            };
+            let (offsets, triangles, _) =
+                smooth(&surface, None, [1.0; 3], &params, &Silent).expect("a smooth surface");
+            let smoothed = Smoothed {
+                surface: &surface,
+                spacing: [1.0; 3],
+                offsets: &offsets,
+                triangles: &triangles,
+            };
+            let found = measure(&smoothed, Voxels::Given(&bits), 1 << 30, &Silent).expect("errors");
+            let diagonals = found.hausdorff / 3f64.sqrt();
+            assert!(
+                (lowest..=highest).contains(&diagonals),
+                "{constraint:?}: {diagonals}"
+            );
+            assert!(found.hausdorff <= found.hausdorff_bound);
+            let wrong = found.misclassified_voxels.expect("closed");
+            assert_eq!(
+                wrong == 0,
+                constraint.is_faithful(),
+                "{constraint:?}: {wrong}"
+            );
+            assert!(found.from_fairest > 0.0 && found.from_fairest < 0.5);
+        }
+    }
+
+    #[test]
+    fn a_cube_turns_at_its_edges() {
+        let mesh = crate::mesh::shapes::cuboid([0.0; 3], [1.0; 3]);
+        // Twelve edges of 90 degrees and six diagonals of squares.
+        assert!((dihedral_mean_deg(&mesh) - 60.0).abs() < 1e-9);
+    }
+}

@@ -60,6 +60,19 @@ impl Surface {
         triangles
     }
 
+    /// The polygons as fans around their first corners, as tables of marching cubes have them.
+    pub fn fans(&self) -> Vec<[u32; 3]> {
+        let mut triangles = Vec::with_capacity(self.loops.triangle_count());
+        let mut corners = &self.loops.corners[..];
+        for length in &self.loops.lengths {
+            let (polygon, after) = corners.split_at(usize::from(*length));
+            corners = after;
+            let rest = polygon[1..].windows(2);
+            triangles.extend(rest.map(|pair| [polygon[0], pair[0], pair[1]]));
+        }
+        triangles
+    }
+
     fn split(&self, polygon: &[u32], positions: &[Vec3], out: &mut [[u32; 3]]) {
         let length = |a: u32, b: u32| {
             let along = sub(positions[a as usize], positions[b as usize]);

@@ -20,6 +20,8 @@ pub mod cesn;
 mod fair;
 pub mod lattice;
 mod neighbours;
+#[cfg(test)]
+mod paper;
 mod parts;
 pub mod region;
 mod relax;
@@ -237,14 +239,9 @@ pub fn smooth(
     progress.stage("smooth", u64::from(params.max_iterations));
     let (mut offsets, outcome) = match params.energy {
         Energy::Laplacian => {
-            let first;
-            let triangles = match given {
-                Some(triangles) => triangles,
-                None => {
-                    first = surface.triangles(&placed(surface, metric, |_| [0.0; 3]));
-                    &first
-                }
-            };
+            // Neighbours are those of the split that the paper's tables have.
+            let fans = given.is_none().then(|| surface.fans());
+            let triangles = given.or(fans.as_deref()).unwrap_or_default();
             Relax::new(surface, triangles, metric, &regions).run(params, &|| progress.advance(1))
         }
         Energy::Bilaplacian => {
