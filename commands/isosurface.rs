@@ -4,7 +4,7 @@ use crate::context::{Context, Files};
 use crate::exit::Exit;
 use crate::job::{Found, Job};
 use crate::shared::{Common, Inputs, Output, Preview, named};
-use crate::smooth_mc::modelled;
+use crate::smooth_mc::{empty, modelled};
 use scantle::error::{Error, Result};
 use scantle::image::colour::OKABE_ITO;
 use scantle::io::format::Kind;
@@ -119,6 +119,7 @@ fn isosurface(job: &mut Job, args: &Args) -> Result<Found<Asked, Stats>> {
     if volume.frame.is_mirrored() {
         mesh.triangles.iter_mut().for_each(|t| t.swap(1, 2));
     }
+    job.warn(empty(&surface));
     job.write_mesh(&mesh)?;
     let stats = Stats {
         vertices: surface.len() as u64,

@@ -283,10 +283,7 @@ fn of_volume(
             (surface, made)
         }
     };
-    if surface.is_empty() {
-        let message = "no voxel is inside: the surface is empty";
-        job.warn(vec![Warning::new("empty-surface", message, 1, None)]);
-    }
+    job.warn(empty(&surface));
     let needed = !several && (args.verify.verify || !args.compare.is_empty());
     let piece = Piece {
         surface,
@@ -588,6 +585,13 @@ fn thin_warning(stats: &smooth_mc::Stats) -> Vec<Warning> {
         stats.vanishing,
         None,
     )]
+}
+
+/// Says so where there is no surface.
+pub fn empty(surface: &Surface) -> Vec<Warning> {
+    let message = "the surface is empty: no voxel is inside, or all are and the border is open";
+    let warning = || Warning::new("empty-surface", message, 1, None);
+    surface.is_empty().then(warning).into_iter().collect()
 }
 
 /// Cells that hold the surface, of those of the volume.

@@ -32,6 +32,26 @@ const CASES: &[(&str, &str, &str)] = &[
         "obj",
         "shadow IN --resolution 32 --bake vertices -o - --output-format ply",
     ),
+    (
+        "fixtures/volumes/labels.nii",
+        "nii",
+        "smooth-mc IN --labels all -o - --output-format ply",
+    ),
+    (
+        "fixtures/volumes/labels.nii",
+        "nii",
+        "smooth-mc IN --label 3 --energy laplacian -o - --output-format ply",
+    ),
+    (
+        "fixtures/shapes/staircase.ply",
+        "ply",
+        "smooth-mc IN -o - --output-format obj",
+    ),
+    (
+        "fixtures/volumes/ball.nrrd",
+        "nrrd",
+        "isosurface IN --iso 0.1 -o - --output-format ply",
+    ),
 ];
 
 /// Command lines whose report is compared.
@@ -39,6 +59,8 @@ const REPORTS: &[&str] = &[
     "info fixtures/shapes/torus.obj",
     "compare fixtures/shapes/cube.obj fixtures/shapes/torus.obj",
     "shadow fixtures/shapes/torus.obj --size 50x40 --resolution 32 --verify",
+    "smooth-mc fixtures/volumes/labels.nii --labels all --verify",
+    "smooth-mc fixtures/volumes/labels.nii --label 1 --verify --compare mc,cesn,taubin",
     "shadow fixtures/shapes/torus.obj --size 50x40 --method exact --verify",
 ];
 

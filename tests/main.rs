@@ -3,6 +3,7 @@
 //! Tests of a function stand beside it, in `src/` and `commands/`.
 
 mod support;
+mod surfaces;
 
 mod atomic;
 mod chapter;

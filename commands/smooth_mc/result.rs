@@ -62,13 +62,13 @@ pub struct Stats {
     volume_percent: Option<f64>,
     /// What is enclosed, in percent of the voxels; null where the surface is open.
     voxel_volume_percent: Option<f64>,
-    /// The symmetric distance to the surface of marching cubes.
+    /// The symmetric distance to the surface as it was.
     hausdorff: Hausdorff,
     /// The bodies, where several labels were asked for.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
     labels: Vec<Body>,
     /// The surface beside those of the methods that `--compare` names.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
     compared: Vec<Judged>,
     /// What `--verify` measured.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -207,7 +207,7 @@ impl Stats {
                 smooth_mc::TRADE.error.name,
                 smooth_mc::TRADE.error.unit,
                 None,
-                verified.map(|v| v.from_fairest),
+                verified.and_then(|v| v.from_fairest),
                 smooth_mc::TRADE.reference,
             ),
             measure(
@@ -218,11 +218,11 @@ impl Stats {
                 "a voxelization of the result",
             ),
             measure(
-                "largest distance to the surface of marching cubes",
+                "largest distance to the surface as it was",
                 "voxel",
                 Some(self.hausdorff.voxels),
                 verified.map(|v| v.hausdorff),
-                "marching cubes",
+                "the surface before smoothing",
             ),
             measure(
                 "volume enclosed",

@@ -8,7 +8,7 @@ use crate::numeric::sums::sum_by;
 use crate::numeric::vector::{Vec3, add, cross, dot, length, normalize, sub};
 use crate::progress::Progress;
 use crate::volume::bits::BitGrid;
-use crate::volume::isosurface::Surface;
+use crate::volume::isosurface::{NONE, Surface};
 use crate::volume::smooth_mc::{Params, smooth, turning};
 use rayon::prelude::*;
 use schemars::JsonSchema;
@@ -24,14 +24,15 @@ pub struct SmoothError {
     /// Voxels whose centres lie on another side than they belong, by a voxelization of the result; null
     /// where it is open.
     pub misclassified_voxels: Option<u64>,
-    /// Largest distance between the surface and that of marching cubes, measured both ways, in the
+    /// Largest distance between the surface and the one that was smoothed, measured both ways, in the
     /// smallest spacing: at least this.
     pub hausdorff: f64,
     /// At most this.
     pub hausdorff_bound: f64,
     /// Root mean square over the vertices of the distance, along its normals, to the fairest surface: the
-    /// least bending within the diamond, after a thousand steps; in the smallest spacing.
-    pub from_fairest: f64,
+    /// least bending within the diamond, after a thousand steps; in the smallest spacing. Null for a dual
+    /// surface, which has no such counterpart.
+    pub from_fairest: Option<f64>,
     /// Root mean square of the angle between chords of the curves in which the fairest surface meets the planes of voxel
     /// centres, in degrees.
     /// Null where there is no curve.
@@ -136,6 +137,25 @@ pub fn measure(
         let found = mesh_distance::compare(&before, &after, &params, progress)?;
         (found.hausdorff, found.hausdorff_bound)
     };
+    let curves = surface.links.iter().any(|links| *links != [NONE; 4]);
+    let (from_fairest, fairest_turning_deg) = if curves {
+        let (distance, turning) = to_fairest(smoothed, progress)?;
+        (Some(distance), turning)
+    } else {
+        (surface.is_empty().then_some(0.0), None)
+    };
+    Ok(SmoothError {
+        misclassified_voxels,
+        hausdorff,
+        hausdorff_bound,
+        from_fairest,
+        fairest_turning_deg,
+    })
+}
+
+/// The distance to the fairest surface, and how much that turns.
+fn to_fairest(smoothed: &Smoothed, progress: &dyn Progress) -> Result<(f64, Option<f64>)> {
+    let (surface, metric) = (smoothed.surface, smoothed.metric());
     let fairest = Params {
         threshold: FAIREST_THRESHOLD,
         max_iterations: FAIREST_STEPS,
@@ -149,14 +169,8 @@ pub fn measure(
             dot(std::array::from_fn(|a| d[a] * metric[a]), normals[v])
         })
         .collect();
-    let from_fairest = (sum_by(&ways, |w| w * w) / ways.len().max(1) as f64).sqrt();
-    Ok(SmoothError {
-        misclassified_voxels,
-        hausdorff,
-        hausdorff_bound,
-        from_fairest,
-        fairest_turning_deg: turning(surface, metric, |v| best[v]),
-    })
+    let distance = (sum_by(&ways, |w| w * w) / ways.len() as f64).sqrt();
+    Ok((distance, turning(surface, metric, |v| best[v])))
 }
 
 /// What any surface of a volume is judged by, whoever made it.
@@ -316,7 +330,8 @@ mod tests {
                 constraint.is_faithful(),
                 "{constraint:?}: {wrong}"
             );
-            assert!(found.from_fairest > 0.0 && found.from_fairest < 0.5);
+            let off = found.from_fairest.expect("a net of curves");
+            assert!(off > 0.0 && off < 0.5);
         }
     }
 
