@@ -98,7 +98,11 @@ impl<P, R> Found<P, R> {
         let (verb, error) = match (reached, bound) {
             (Some(reached), _) => ("is", *reached),
             (None, Some(bound)) => ("may be up to", *bound),
-            (None, None) => return Some(format!("{measure} is neither measured nor bounded")),
+            (None, None) => {
+                return Some(format!(
+                    "{measure} is neither measured nor bounded; --verify measures it"
+                ));
+            }
         };
         // Written so that an error which is no number fails too.
         let holds = error <= most;
