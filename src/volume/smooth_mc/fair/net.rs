@@ -137,7 +137,8 @@ impl Net {
                         let mut diagonal = diagonal(first + lane, nodes, rows);
                         if special >> lane & 1 == 1 {
                             for (from, slot) in fair.arms(first + lane) {
-                                diagonal += rows[from][slot / 2] * nodes[from].inverse[slot].powi(2);
+                                diagonal +=
+                                    rows[from][slot / 2] * nodes[from].inverse[slot].powi(2);
                             }
                         }
                         *step = if diagonal > 0.0 { STEP / diagonal } else { 0.0 };
@@ -183,7 +184,9 @@ impl Fair<'_> {
     /// The curves that end at a vertex without going on: the vertex that they come from, and its slot.
     pub(super) fn arms(&self, vertex: usize) -> impl Iterator<Item = (usize, usize)> {
         let arms = &self.surface.arms[..];
-        let all = if arms.is_empty() || self.surface.is_on_edge(vertex) {
+        // Those that fill up the last group are none of the surface's.
+        let none = arms.is_empty() || vertex >= self.surface.len();
+        let all = if none || self.surface.is_on_edge(vertex) {
             &[]
         } else {
             let of = |v: usize| arms.partition_point(|arm| (arm.0 as usize) < v);
@@ -213,8 +216,13 @@ impl Fair<'_> {
         // There is no chord to the vertex itself.
         let links = self.surface.links[vertex];
         let inverse = (f32x4::ONE / sizes).to_array();
-        node.inverse =
-            std::array::from_fn(|slot| if links[slot] == NONE { 0.0 } else { inverse[slot] });
+        node.inverse = std::array::from_fn(|slot| {
+            if links[slot] == NONE {
+                0.0
+            } else {
+                inverse[slot]
+            }
+        });
         let sizes = sizes.to_array();
         let rows = [0, 1].map(|curve| {
             if links[2 * curve] == NONE || links[2 * curve + 1] == NONE {
