@@ -102,10 +102,10 @@ impl<'a> Fair<'a> {
         let mut outcome = Outcome::default();
         for iteration in 0..most as usize {
             if iteration % PERIOD == 0 {
-                let offsets = sweep.offsets();
-                net.weigh(self, &offsets);
+                let (offsets, ahead) = sweep.offsets();
+                net.weigh(self, offsets);
                 if iteration > 0 {
-                    self.inflate(&offsets, sweep.ahead(), inflate);
+                    self.inflate(offsets, ahead, inflate);
                 }
             }
             let next = 0.5 * (1.0 + (1.0 + 4.0 * momentum * momentum).sqrt());
@@ -122,7 +122,7 @@ impl<'a> Fair<'a> {
             }
         }
         drop(net);
-        (self.in_voxels(&sweep.offsets()), outcome)
+        (self.in_voxels(sweep.offsets().0), outcome)
     }
 
     /// Offsets in voxels, within their regions to the last bit.

@@ -77,13 +77,10 @@ impl Sweep {
         }
     }
 
-    pub(super) fn ahead(&mut self) -> &mut [f32x4] {
-        &mut self.ahead
-    }
-
-    /// The offset of each vertex.
-    pub(super) fn offsets(&self) -> Vec<f32x4> {
-        let mut all = vec![f32x4::ZERO; self.ahead.len()];
+    /// The offset of each vertex, and where the momentum takes it.
+    pub(super) fn offsets(&mut self) -> (&[f32x4], &mut [f32x4]) {
+        // What is there is of no use before the next step.
+        let all = &mut self.next;
         all.par_chunks_mut(CHUNK)
             .zip(self.offsets.par_chunks(CHUNK / GROUP))
             .for_each(|(out, groups)| {
@@ -91,7 +88,7 @@ impl Sweep {
                     out.copy_from_slice(&f32x4::transpose([*x, *y, *z, f32x4::ZERO]));
                 }
             });
-        all
+        (all, &mut self.ahead)
     }
 
     /// One step down the gradient and back into the regions. Returns the longest way and whether it went

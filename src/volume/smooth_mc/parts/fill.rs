@@ -10,7 +10,7 @@ use std::borrow::Cow;
 use wide::f32x4;
 
 /// What is enclosed is held to this share, where the regions allow it.
-const CLOSE: f64 = 1e-5;
+const CLOSE: f64 = 5e-5;
 
 /// A part is left where a round brings it no closer than this share.
 const GAIN: f64 = 0.95;
