@@ -442,7 +442,7 @@ impl Part {
                 active &= u64::MAX << (first - 64 * i).min(63);
             }
             if 64 * (i + 1) > end {
-                active &= (1u64 << (end.saturating_sub(64 * i)) % 64).wrapping_sub(1);
+                active &= (1u64 << (end.saturating_sub(64 * i) % 64)).wrapping_sub(1);
             }
             let corner = inside.map(|words| words[i]);
             let corner_after = inside.map(|words| next(words, i));

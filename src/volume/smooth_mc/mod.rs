@@ -32,7 +32,6 @@ mod trade;
 
 use crate::error::{Error, Result};
 use crate::mesh::Mesh;
-use crate::numeric::sums::sum_by;
 use crate::numeric::vector::{Vec3, dot, sub};
 use crate::progress::Progress;
 use crate::trade::named;
@@ -75,7 +74,8 @@ named!(Update { Jacobi = "jacobi", GaussSeidel = "gauss-seidel" });
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Thin {
-    /// Vertices go half as far, so that nothing vanishes.
+    /// Vertices go half as far, so that nothing vanishes. Where what is enclosed is held, they go half as
+    /// far inwards, and parts that have gone flat all the same are filled from their first places.
     Guard,
     /// Vertices stay.
     Keep,
@@ -235,7 +235,7 @@ pub fn smooth(
     let metric = spacing.map(|s| s / smallest);
     let regions = |vertex: usize| region(surface, vertex, params);
     let parts = Parts::find(surface);
-    let before = parts.enclosed(surface, |_| [0.0; 3]);
+    let before = parts.enclosed(surface);
     progress.stage("smooth", u64::from(params.max_iterations));
     let (mut offsets, outcome) = match params.energy {
         Energy::Laplacian => {
@@ -258,11 +258,14 @@ pub fn smooth(
         Some(triangles) => triangles.to_vec(),
         None => surface.triangles(&placed(surface, metric, |v| offsets[v])),
     };
-    if params.energy == Energy::Bilaplacian {
-        progress.stage("fill", 0);
-        parts.fill(surface, &triangles, metric, &regions, &mut offsets);
-    }
-    let after = parts.enclosed_by(surface, &triangles, |v| offsets[v]);
+    let after = match params.energy {
+        Energy::Laplacian => parts.enclosed_by(surface, &triangles, |v| offsets[v]),
+        Energy::Bilaplacian => {
+            progress.stage("fill", 0);
+            let kept = (params.thin != Thin::Off).then_some(&before[..]);
+            parts.fill(surface, &triangles, metric, &regions, kept, &mut offsets)
+        }
+    };
     let turned = [
         turning(surface, metric, |_| [0.0; 3]),
         turning(surface, metric, |v| offsets[v]),
@@ -299,8 +302,8 @@ pub fn turning(
         let d = sub(offset((surface.links[v][slot] >> 2) as usize), offset(v));
         std::array::from_fn(|a| (0.5 * f64::from(step[a]) + d[a]) * metric[a])
     };
-    let square = |v: &usize, c: usize| -> f64 {
-        let (a, b): (Vec3, Vec3) = (chord(*v, 2 * c), chord(*v, 2 * c + 1));
+    let square = |v: usize, c: usize| -> f64 {
+        let (a, b): (Vec3, Vec3) = (chord(v, 2 * c), chord(v, 2 * c + 1));
         let size = (dot(a, a) * dot(b, b)).sqrt();
         if size > 0.0 {
             2.0 + 2.0 * dot(a, b) / size
@@ -308,10 +311,26 @@ pub fn turning(
             0.0
         }
     };
-    let vertices: Vec<usize> = (0..surface.len()).collect();
-    let curves = |v: usize| (0..2).filter(move |c| !surface.links[v][2 * c..][..2].contains(&NONE));
-    let squares = sum_by(&vertices, |v| curves(*v).map(|c| square(v, c)).sum());
-    let count = sum_by(&vertices, |v| curves(*v).count() as f64);
+    // Sums of fixed chunks, so that they never follow the threads.
+    let partial: Vec<(f64, u64)> = surface
+        .links
+        .par_chunks(1 << 12)
+        .enumerate()
+        .map(|(chunk, links)| {
+            let (mut squares, mut count) = (0.0, 0);
+            for (i, links) in links.iter().enumerate() {
+                for c in 0..2 {
+                    if links[2 * c] != NONE && links[2 * c + 1] != NONE {
+                        squares += square((chunk << 12) + i, c);
+                        count += 1;
+                    }
+                }
+            }
+            (squares, count)
+        })
+        .collect();
+    let squares: f64 = partial.iter().map(|p| p.0).sum();
+    let count = partial.iter().map(|p| p.1).sum::<u64>() as f64;
     let mean = 0.5 * (squares / count).sqrt();
     (count > 0.0).then(|| 2.0 * mean.min(1.0).asin().to_degrees())
 }
@@ -502,7 +521,7 @@ fn stats(
         awake_share: outcome.updates as f64 / (n * u64::from(outcome.iterations)).max(1) as f64,
         boundary_vertices: surface.ends() as u64,
         thin_vertices: surface.thin.iter().filter(|t| **t).count() as u64,
-        max_displacement: offsets.iter().map(way).fold(0.0, f64::max),
+        max_displacement: offsets.par_iter().map(way).reduce(|| 0.0, f64::max),
         components: count,
         largest: listed,
         vanishing: vanishing as u64,

@@ -1,7 +1,8 @@
 //! The parts of a surface that do not touch, and what each encloses.
 
-use super::fair::{Fair, Inflate};
-use super::region::Region;
+mod fill;
+
+use super::fair::Inflate;
 use crate::numeric::vector::{Vec3, cross, dot, sub};
 use crate::volume::isosurface::{NONE, Surface, axis_of};
 use rayon::prelude::*;
@@ -13,15 +14,6 @@ const CHUNK: usize = 1 << 13;
 
 /// The farthest that a part is moved at once, in the smallest spacing: its normals hold no farther.
 const FARTHEST: f64 = 0.25;
-
-/// What is enclosed is held to this share, where the regions allow it.
-const CLOSE: f64 = 1e-5;
-
-/// A part is left where a round brings it no closer than this share.
-const GAIN: f64 = 0.95;
-
-/// Most rounds of filling.
-const ROUNDS: usize = 20;
 
 /// The parts of a surface, numbered by their first vertices.
 pub(super) struct Parts {
@@ -146,14 +138,74 @@ impl Parts {
         self.sizes.len()
     }
 
-    /// What each part encloses, in voxels, its polygons split at their first corners.
-    pub(super) fn enclosed(
-        &self,
-        surface: &Surface,
-        offset: impl Fn(usize) -> Vec3 + Sync,
-    ) -> Vec<f64> {
-        let sums = self.sum(surface, [1.0; 3], &offset);
-        sums.into_iter().map(|s| s.volume).collect()
+    /// What each part of the surface of marching cubes encloses, in voxels, its polygons split at their
+    /// first corners; sums of whole numbers.
+    pub(super) fn enclosed(&self, surface: &Surface) -> Vec<f64> {
+        let chunks = surface.loops.chunks();
+        let partial: Vec<BTreeMap<u32, i64>> = chunks
+            .into_par_iter()
+            .map(|(lengths, mut corners)| {
+                let mut sums = BTreeMap::new();
+                let (mut current, mut sum) = ((0, None), 0);
+                let mut flush = |(inside, outside): (u32, Option<u32>), sum: i64| {
+                    *sums.entry(inside).or_insert(0) += sum;
+                    if let Some(outside) = outside {
+                        *sums.entry(outside).or_insert(0) -= sum;
+                    }
+                };
+                for length in lengths {
+                    let (polygon, rest) = corners.split_at(usize::from(*length));
+                    corners = rest;
+                    let parts = self.parts_of(surface, polygon);
+                    if parts != current {
+                        flush(current, std::mem::take(&mut sum));
+                        current = parts;
+                    }
+                    sum += self.doubled(surface, polygon);
+                }
+                flush(current, sum);
+                sums
+            })
+            .collect();
+        let mut all = vec![0i64; self.len()];
+        for (part, sum) in partial.into_iter().flatten() {
+            all[part as usize] += sum;
+        }
+        // Places are doubled, and a triangle and the origin make a sixth of their determinant.
+        all.into_iter().map(|sum| sum as f64 / 48.0).collect()
+    }
+
+    /// 48 times what lies between a polygon and the origin of its part.
+    #[inline]
+    fn doubled(&self, surface: &Surface, polygon: &[u32]) -> i64 {
+        let first = surface.places[polygon[0] as usize];
+        let from = self.origins[self.of[polygon[0] as usize] as usize];
+        // Differences within a cell are 2 at most.
+        let to = |v: u32| -> [i32; 3] {
+            let place = surface.places[v as usize];
+            std::array::from_fn(|a| place[a] - first[a])
+        };
+        let mut normal = [0i32; 3];
+        let mut b = to(polygon[1]);
+        for v in &polygon[2..] {
+            let c = to(*v);
+            normal[0] += b[1] * c[2] - b[2] * c[1];
+            normal[1] += b[2] * c[0] - b[0] * c[2];
+            normal[2] += b[0] * c[1] - b[1] * c[0];
+            b = c;
+        }
+        (0..3)
+            .map(|a| i64::from(normal[a]) * (i64::from(first[a]) - i64::from(from[a])))
+            .sum()
+    }
+
+    /// The part inside of a triangle or polygon, and where there are labels that outside.
+    #[inline]
+    fn parts_of(&self, surface: &Surface, corners: &[u32]) -> (u32, Option<u32>) {
+        match surface.sides_of(corners) {
+            Some([inside, outside]) => (u32::from(inside), Some(u32::from(outside))),
+            None => (self.of[corners[0] as usize], None),
+        }
     }
 
     /// What each part encloses, in voxels, as these triangles do.
@@ -267,72 +319,6 @@ impl Parts {
         };
         sums.iter().enumerate().map(by).collect()
     }
-
-    /// Moves each part along its normals until it encloses its voxels, as far as the regions let it.
-    pub(super) fn fill(
-        &self,
-        surface: &Surface,
-        triangles: &[[u32; 3]],
-        metric: Vec3,
-        regions: &(dyn Fn(usize) -> Region + Sync),
-        offsets: &mut Vec<Vec3>,
-    ) {
-        let fair = Fair::new(surface, metric, 0.5, regions);
-        let voxel = metric[0] * metric[1] * metric[2];
-        let mut left = vec![f64::INFINITY; self.len()];
-        let mut around: Vec<[u32; 3]> = triangles.to_vec();
-        let mut moving: Vec<u32> = (0..surface.len() as u32).collect();
-        let mut at: Vec<f32x4> = offsets
-            .par_iter()
-            .with_min_len(CHUNK)
-            .map(|o| single(*o, metric))
-            .collect();
-        let mut placed = self.placed(surface, metric, &|v| offsets[v]);
-        for _ in 0..ROUNDS {
-            let sums = self.sum_placed(surface, &around, &placed);
-            let mut open = vec![false; self.len()];
-            for (part, sum) in sums.iter().enumerate() {
-                let wanted = self.voxels[part].map_or(sum.volume, |v| v as f64 * voxel);
-                let off = (sum.volume - wanted).abs();
-                // What the regions no longer let closer is left.
-                open[part] = off > CLOSE * wanted.abs() && off < GAIN * left[part];
-                // The sums of parts that are left are no longer whole.
-                left[part] = if open[part] { off } else { 0.0 };
-            }
-            if !open.contains(&true) {
-                break;
-            }
-            let moves = |v: u32| {
-                let (inside, outside) = self.sides(v as usize);
-                open[inside] || outside.is_some_and(|part| open[part])
-            };
-            // With labels, what is left on one side may be open on the other.
-            around.retain(|t| t.iter().any(|v| moves(*v)));
-            moving.retain(|v| moves(*v));
-            let by = self.missing(&sums, metric);
-            let by = |v: usize| {
-                let (inside, outside) = self.sides(v);
-                let of = |part: usize| if open[part] { by[part] } else { 0.0 };
-                of(inside) - outside.map_or(0.0, of)
-            };
-            let next = |v: &u32| {
-                let v = *v as usize;
-                let (normal, by) = (fair.normal(&at, v).to_array(), by(v));
-                let moved = |a: usize| offsets[v][a] + f64::from(normal[a]) * by / metric[a];
-                regions(v).project(std::array::from_fn(moved), metric)
-            };
-            let moved: Vec<Vec3> = moving.par_iter().with_min_len(CHUNK).map(next).collect();
-            for (v, moved) in moving.iter().zip(moved) {
-                let v = *v as usize;
-                let d = sub(moved, offsets[v]);
-                for a in 0..3 {
-                    placed[v][a] += d[a] * metric[a];
-                }
-                at[v] = single(moved, metric);
-                offsets[v] = moved;
-            }
-        }
-    }
 }
 
 /// An offset in voxels, in single precision and the smallest spacing.
@@ -372,13 +358,10 @@ impl<'a> Sums<'a> {
 
     #[inline]
     fn add(&mut self, triangle: [u32; 3]) {
-        let (part, outside) = match self.surface.sides_of(&triangle) {
-            Some([inside, outside]) => (u32::from(inside), Some(u32::from(outside))),
-            None => (self.parts.of[triangle[0] as usize], None),
-        };
-        if (part, outside) != self.current {
+        let parts = self.parts.parts_of(self.surface, &triangle);
+        if parts != self.current {
             self.flush();
-            self.current = (part, outside);
+            self.current = parts;
         }
         let [a, b, c] = triangle.map(|v| self.at[v as usize]);
         let normal = cross(sub(b, a), sub(c, a));

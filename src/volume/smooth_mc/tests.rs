@@ -1,3 +1,5 @@
+mod thin;
+
 use super::*;
 use crate::numeric::vector::{cross, dot, length, normalize, sub};
 use crate::progress::Silent;
