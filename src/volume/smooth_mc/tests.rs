@@ -55,3 +55,20 @@ fn a_ball_becomes_round_and_keeps_its_volume() {
     assert!((volume / voxels - 1.0).abs() <= 1e-3, "{volume} {voxels}");
     assert!(stats.max_displacement <= 0.5);
 }
+
+/// The ball is large enough for several runs of chunks where there are several threads.
+#[test]
+fn any_number_of_threads_smooths_alike() {
+    let ball = ball(40.0, 86, 42.623);
+    let on = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new()
+            .num_threads(threads)
+            .build()
+            .expect("a pool");
+        pool.install(|| {
+            let surface = extract(&ball, &Select::Set, Border::Closed, &Silent).expect("a surface");
+            smooth(&surface, None, [1.0, 1.0, 1.5], &Params::DEFAULT, &Silent).expect("it smooth")
+        })
+    };
+    assert_eq!(on(1), on(3));
+}
