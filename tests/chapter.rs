@@ -103,13 +103,16 @@ fn reach(result: &Value) -> String {
             .map_or("none".to_owned(), |n| format!("{n:e}"))
     };
     let name = |key: &str| result["unchanged"][key].to_string();
-    let offset = number(&result["unchanged"]["offset"]);
+    let shifts = match &result["unchanged"]["offset"] {
+        Value::Null => String::new(),
+        offset => format!(" and exact shifts of up to {} extents", number(offset)),
+    };
     let drift = match result["drift"].as_f64() {
         Some(0.0) => "there is no drift".to_owned(),
         _ => format!("the largest drift is {}", number(&result["drift"])),
     };
     format!(
-        "No result changes under scales from 2^{} to 2^{} and exact shifts of up to {offset} extents; under all changes that the command promises to bear {drift}.",
+        "No result changes under scales from 2^{} to 2^{}{shifts}; under all changes that the command promises to bear {drift}.",
         name("smallest_scale"),
         name("largest_scale"),
     )
@@ -147,6 +150,7 @@ fn the_chapter_on_the_trade_is_current() {
                 .is_empty()
         );
         let extreme = format!("stability {command} {words} {extremes}");
+        let extreme = extreme.trim_end();
         let held = reach(&run(&place, &format!("{extreme} -q"))["result"]);
         let first = &report["result"]["rows"][0]["setting"];
         let knobs: Vec<&str> = first
