@@ -22,7 +22,7 @@ use scantle::volume::bits::BitGrid;
 use scantle::volume::isosurface::{self, Border, Labels, Select, Surface};
 use scantle::volume::smooth_mc::lattice::{self, Given, Lattice};
 use scantle::volume::smooth_mc::region::Constraint;
-use scantle::volume::smooth_mc::{self, Energy, Params, Thin, Update, cesn, taubin};
+use scantle::volume::smooth_mc::{self, Energy, Made, Params, Thin, Update, cesn, taubin};
 use scantle::volume::{Frame, Volume};
 use schemars::JsonSchema;
 use select::Inside;
@@ -272,11 +272,7 @@ fn of_volume(
             let made = smooth_mc::smooth(&walls, None, steps, params, job.progress())?;
             (walls, made)
         }
-        _ if dual => {
-            let (surface, offsets, triangles, stats) =
-                smooth_mc::smooth_net(&volume, &one, args.border, params, job.progress())?;
-            (surface, (offsets, triangles, stats))
-        }
+        _ if dual => smooth_mc::smooth_net(&volume, &one, args.border, params, job.progress())?,
         _ => {
             let surface = isosurface::extract(&volume, &one, args.border, job.progress())?;
             let made = smooth_mc::smooth(&surface, None, steps, params, job.progress())?;
@@ -350,7 +346,7 @@ fn of_mesh(
 fn finish(
     job: &mut Job,
     piece: Piece,
-    (offsets, triangles, smoothing): (Vec<[f64; 3]>, Vec<[u32; 3]>, smooth_mc::Stats),
+    (offsets, triangles, smoothing): Made,
     params: &Params,
     args: &Args,
     memory: u64,

@@ -22,7 +22,7 @@ pub struct Labels {
 pub const MOST_LABELS: usize = u16::MAX as usize - 1;
 
 impl Labels {
-    /// Labels of these values, each once, in any order; at most [`MOST_LABELS`].
+    /// Labels of these values, each once, in any order; at most 65534.
     pub fn new(mut values: Vec<f64>) -> Self {
         values.sort_by(f64::total_cmp);
         values.dedup();

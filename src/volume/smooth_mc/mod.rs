@@ -9,7 +9,7 @@
 //! are kept smaller by a millionth. A test repeats the search.)
 //!
 //! Two energies are minimised under that constraint. `laplacian` is the paper's: each vertex goes to
-//! the mean of its neighbours and is clipped. `bilaplacian` ([`fair`]) is smoother, for it does not
+//! the mean of its neighbours and is clipped. `bilaplacian` (`fair`) is smoother, for it does not
 //! shrink, and holds what is enclosed to what the voxels hold.
 //!
 //! Source: "Constrained smoothing of marching cubes surfaces" (WSCG), sections 3 and 4, with these
@@ -214,6 +214,9 @@ pub struct Stats {
     pub volume_after: Option<f64>,
 }
 
+/// The way of each vertex in voxels, the triangles, and what is said of them.
+pub type Made = (Vec<Vec3>, Vec<[u32; 3]>, Stats);
+
 /// Most parts that are listed.
 const LISTED: usize = 32;
 
@@ -229,7 +232,7 @@ pub fn smooth(
     spacing: Vec3,
     params: &Params,
     progress: &dyn Progress,
-) -> Result<(Vec<Vec3>, Vec<[u32; 3]>, Stats)> {
+) -> Result<Made> {
     params.check()?;
     let smallest = spacing.iter().copied().fold(f64::INFINITY, f64::min);
     let metric = spacing.map(|s| s / smallest);
@@ -387,7 +390,7 @@ pub fn smooth_net(
     border: Border,
     params: &Params,
     progress: &dyn Progress,
-) -> Result<(Surface, Vec<Vec3>, Vec<[u32; 3]>, Stats)> {
+) -> Result<(Surface, Made)> {
     params.check()?;
     let steps = (params.threshold, params.max_iterations);
     let net = cesn::cesn(volume, select, border, steps.0, steps.1, progress)?;
@@ -431,7 +434,7 @@ pub fn smooth_net(
     stats.voxels = closed.then(|| inside(volume, select).count() as i64);
     stats.volume_before = closed.then(|| before.iter().sum());
     stats.volume_after = closed.then(|| after.iter().sum());
-    Ok((surface, net.offsets, net.triangles, stats))
+    Ok((surface, (net.offsets, net.triangles, stats)))
 }
 
 /// Where a vertex may go.
