@@ -179,7 +179,7 @@ mod tests {
         let why = |line| wrapped(line).expect_err("a refusal");
         assert_eq!(
             why("nonsense a"),
-            "there is no command nonsense; those with a trade: voxelize, shadow"
+            "there is no command nonsense; those with a trade: voxelize, shadow, smooth-mc"
         );
         assert_eq!(why("info a"), "info has no trade: it counts, exactly");
         assert_eq!(
