@@ -9,11 +9,13 @@ use crate::exit::Exit;
 use crate::job::{Found, Job};
 use crate::shared::{Common, Inputs, MaxError, Output, Preview, Verify, list, named};
 use clap::value_parser;
-use result::{Body, Stats};
+use result::{Body, Directions, Stats};
 use scantle::error::{Error, Fault, Result, number};
 use scantle::image::colour::{CLAY, OKABE_ITO};
-use scantle::io::Content;
 use scantle::io::format::Kind;
+use scantle::io::source::Source;
+use scantle::io::{Content, read_mesh};
+use scantle::measure::normal_error::normal_rms_deg;
 use scantle::measure::smooth_error::{self, Judged, Smoothed, Voxels};
 use scantle::mesh::Mesh;
 use scantle::render::preview::{self, Panel, What};
@@ -82,6 +84,9 @@ pub struct Args {
     /// `taubin`, 110 rounds without a constraint
     #[arg(long, value_name = "METHOD,...", value_delimiter = ',', value_parser = named(Other::NAMES, Other::from_name))]
     compare: Vec<Other>,
+    /// A mesh to compare directions with: the true shape, where it is known
+    #[arg(long, value_name = "FILE")]
+    reference: Option<String>,
     /// A table of labels and their names, as comma-separated values
     #[arg(long, value_name = "FILE", requires = "labels")]
     label_names: Option<String>,
@@ -169,6 +174,8 @@ pub struct Asked {
     inside: Inside,
     /// What happens where the volume ends.
     border: Border,
+    /// The mesh that directions were compared with.
+    reference: Option<String>,
     #[serde(flatten)]
     params: Params,
 }
@@ -265,16 +272,22 @@ fn of_volume(
         return Err(Error::parameter(option, params.constraint.name(), problem));
     }
     let steps = volume.frame.spacing();
+    let room = |job: &Job, surface: &Surface| {
+        // Offsets, the steps' own list and triangles, some of them twice.
+        job.expect_room("smoothing the surface", 300 * surface.len() as u128)
+    };
     let (surface, made) = match &what {
         Inside::Labels(values) => {
             let labels = Labels::new(values.clone());
             let walls = isosurface::extract_labels(&volume, &labels, job.progress())?;
+            room(job, &walls)?;
             let made = smooth_mc::smooth(&walls, None, steps, params, job.progress())?;
             (walls, made)
         }
         _ if dual => smooth_mc::smooth_net(&volume, &one, args.border, params, job.progress())?,
         _ => {
             let surface = isosurface::extract(&volume, &one, args.border, job.progress())?;
+            room(job, &surface)?;
             let made = smooth_mc::smooth(&surface, None, steps, params, job.progress())?;
             (surface, made)
         }
@@ -395,8 +408,9 @@ fn finish(
     } else {
         job.write_mesh(&mesh)?;
     }
-    let stats =
-        Stats::new(&piece, smoothing, &offsets, triangles.len()).with(bodies, verified, compared);
+    let turned_by = directions(&piece, &mesh, args, memory)?;
+    let stats = Stats::new(&piece, smoothing, &offsets, triangles.len())
+        .with(bodies, verified, compared, turned_by);
     let summary = stats.summary();
     let accuracy = stats.accuracy(params);
     let wrong = stats.wrong(params);
@@ -405,6 +419,7 @@ fn finish(
     let asked = Asked {
         inside: piece.inside,
         border: args.border,
+        reference: args.reference.clone(),
         params: *params,
     };
     Ok(Found::new(asked, stats, summary)
@@ -412,6 +427,27 @@ fn finish(
         .modelled(made)
         .check("max-error", args.max_error.max_error)
         .beyond_measure(wrong))
+}
+
+/// How far triangles are turned from those of the reference, before and after.
+fn directions(
+    piece: &Piece,
+    smooth: &Mesh,
+    args: &Args,
+    memory: u64,
+) -> Result<Option<Directions>> {
+    let Some(file) = &args.reference else {
+        return Ok(None);
+    };
+    let reference = read_mesh(&Source::open(file, memory)?, None)?.0;
+    let before = Mesh {
+        positions: piece.positions(&vec![[0.0; 3]; piece.surface.len()]),
+        ..smooth.clone()
+    };
+    Ok(Some(Directions {
+        before: normal_rms_deg(&before, &reference)?,
+        after: normal_rms_deg(smooth, &reference)?,
+    }))
 }
 
 /// The bodies, where there are several.
@@ -547,6 +583,7 @@ fn of_any_mesh(
     let asked = Asked {
         inside: Inside::Set,
         border: args.border,
+        reference: args.reference.clone(),
         params: *params,
     };
     Ok(Found::new(asked, stats, summary)

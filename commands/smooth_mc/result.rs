@@ -30,6 +30,15 @@ pub struct Body {
     pub misclassified_voxels: Option<u64>,
 }
 
+/// Root mean square of the angle between triangles and those of the reference, by area, in degrees.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct Directions {
+    /// Of the surface as it was; null where no triangle has area.
+    pub before: Option<f64>,
+    /// Of the smooth surface; null where no triangle has area.
+    pub after: Option<f64>,
+}
+
 /// Distances between surfaces.
 #[derive(Debug, Serialize, JsonSchema)]
 pub struct Hausdorff {
@@ -64,6 +73,9 @@ pub struct Stats {
     voxel_volume_percent: Option<f64>,
     /// The symmetric distance to the surface as it was.
     hausdorff: Hausdorff,
+    /// Angles to the triangles of `--reference`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    normal_rms_deg: Option<Directions>,
     /// The bodies, where several labels were asked for.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     labels: Vec<Body>,
@@ -109,6 +121,7 @@ impl Stats {
             voxel_volume_percent: percent(smoothing.voxels.map(|v| v as f64)),
             hausdorff: Hausdorff::new(offsets.iter().map(way).fold(0.0, f64::max), spacing, false),
             smoothing,
+            normal_rms_deg: None,
             labels: Vec::new(),
             compared: Vec::new(),
             verified: None,
@@ -129,6 +142,7 @@ impl Stats {
             // No vertex leaves half of its box.
             hausdorff: Hausdorff::new(0.5 * length(spacing), spacing, false),
             smoothing,
+            normal_rms_deg: None,
             labels: Vec::new(),
             compared: Vec::new(),
             verified: None,
@@ -141,6 +155,7 @@ impl Stats {
         labels: Vec<Body>,
         verified: Option<SmoothError>,
         compared: Vec<Judged>,
+        normal_rms_deg: Option<Directions>,
     ) -> Self {
         if let Some(found) = &verified {
             let smallest = self.spacing.iter().copied().fold(f64::INFINITY, f64::min);
@@ -152,6 +167,7 @@ impl Stats {
             labels,
             verified,
             compared,
+            normal_rms_deg,
             ..self
         }
     }
