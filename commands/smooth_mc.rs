@@ -1,5 +1,6 @@
 //! `scantle smooth-mc`: a binary volume becomes a smooth surface that keeps every voxel on its side.
 
+mod beside;
 mod names;
 mod result;
 mod select;
@@ -8,15 +9,14 @@ use crate::context::{Context, Files};
 use crate::exit::Exit;
 use crate::job::{Found, Job};
 use crate::shared::{Common, Inputs, MaxError, Output, Preview, Verify, list, named};
+use beside::Other;
 use clap::value_parser;
-use result::{Body, Directions, Stats};
+use result::{Body, Stats};
 use scantle::error::{Error, Fault, Result, number};
 use scantle::image::colour::{CLAY, OKABE_ITO};
+use scantle::io::Content;
 use scantle::io::format::Kind;
-use scantle::io::source::Source;
-use scantle::io::{Content, read_mesh};
-use scantle::measure::normal_error::normal_rms_deg;
-use scantle::measure::smooth_error::{self, Judged, Smoothed, Voxels};
+use scantle::measure::smooth_error::{self, Smoothed, Voxels};
 use scantle::mesh::Mesh;
 use scantle::render::preview::{self, Panel, What};
 use scantle::report::{Measures, Modelled, Warning};
@@ -24,7 +24,7 @@ use scantle::volume::bits::BitGrid;
 use scantle::volume::isosurface::{self, Border, Labels, Select, Surface};
 use scantle::volume::smooth_mc::lattice::{self, Given, Lattice};
 use scantle::volume::smooth_mc::region::Constraint;
-use scantle::volume::smooth_mc::{self, Energy, Made, Params, Thin, Update, cesn, taubin};
+use scantle::volume::smooth_mc::{self, Energy, Made, Params, Thin, Update};
 use scantle::volume::{Frame, Volume};
 use schemars::JsonSchema;
 use select::Inside;
@@ -119,27 +119,6 @@ Examples:
   scantle smooth-mc fixtures/volumes/labels.nii --label 1 -o one.ply --preview one.png
   scantle smooth-mc fixtures/volumes/labels.nii --labels all -o label-{label}.ply --verify
 ";
-
-/// A method to compare with.
-#[derive(Debug, Clone, Copy)]
-enum Other {
-    Mc,
-    Cesn,
-    Taubin,
-}
-
-impl Other {
-    const NAMES: &'static [&'static str] = &["mc", "cesn", "taubin"];
-
-    fn from_name(name: &str) -> Option<Self> {
-        let all = [Other::Mc, Other::Cesn, Other::Taubin];
-        all.into_iter().find(|other| other.name() == name)
-    }
-
-    const fn name(self) -> &'static str {
-        Self::NAMES[self as usize]
-    }
-}
 
 /// Which labels.
 #[derive(Debug, Clone)]
@@ -379,7 +358,7 @@ fn finish(
             smooth_error::measure(&smoothed, voxels, memory, job.progress())
         })
         .transpose()?;
-    let compared = compare(job, &piece, &smoothed, params, args, memory)?;
+    let compared = beside::compare(job, &piece, &smoothed, params, args, memory)?;
     let bodies = bodies(job, &piece, &smoothed, &smoothing, args, memory)?;
     let mirrored = piece.frame.is_mirrored();
     let positions = piece.positions(&offsets);
@@ -408,7 +387,7 @@ fn finish(
     } else {
         job.write_mesh(&mesh)?;
     }
-    let turned_by = directions(&piece, &mesh, args, memory)?;
+    let turned_by = beside::directions(&piece, &mesh, args, memory)?;
     let stats = Stats::new(&piece, smoothing, &offsets, triangles.len())
         .with(bodies, verified, compared, turned_by);
     let summary = stats.summary();
@@ -427,27 +406,6 @@ fn finish(
         .modelled(made)
         .check("max-error", args.max_error.max_error)
         .beyond_measure(wrong))
-}
-
-/// How far triangles are turned from those of the reference, before and after.
-fn directions(
-    piece: &Piece,
-    smooth: &Mesh,
-    args: &Args,
-    memory: u64,
-) -> Result<Option<Directions>> {
-    let Some(file) = &args.reference else {
-        return Ok(None);
-    };
-    let reference = read_mesh(&Source::open(file, memory)?, None)?.0;
-    let before = Mesh {
-        positions: piece.positions(&vec![[0.0; 3]; piece.surface.len()]),
-        ..smooth.clone()
-    };
-    Ok(Some(Directions {
-        before: normal_rms_deg(&before, &reference)?,
-        after: normal_rms_deg(smooth, &reference)?,
-    }))
 }
 
 /// The bodies, where there are several.
@@ -495,62 +453,6 @@ fn bodies(
         });
     }
     Ok(bodies)
-}
-
-/// The surfaces of other methods beside this one, judged alike.
-fn compare(
-    job: &mut Job,
-    piece: &Piece,
-    smoothed: &Smoothed,
-    params: &Params,
-    args: &Args,
-    memory: u64,
-) -> Result<Vec<Judged>> {
-    if args.compare.is_empty() {
-        return Ok(Vec::new());
-    }
-    let surface = &piece.surface;
-    let spacing = smoothed.spacing;
-    let zero = vec![[0.0; 3]; surface.len()];
-    let mut before = smooth_error::lattice_mesh(surface, [1.0; 3], &zero, &[]);
-    before.triangles = surface.triangles(&before.positions);
-    let own = smooth_error::lattice_mesh(surface, [1.0; 3], smoothed.offsets, smoothed.triangles);
-    let mut all = vec![("smooth-mc", own)];
-    for method in &args.compare {
-        let mesh = match method {
-            Other::Mc => before.clone(),
-            Other::Taubin => {
-                let scaled = |p: &[f64; 3]| [0, 1, 2].map(|a| p[a] * spacing[a]);
-                let at: Vec<[f64; 3]> = before.positions.iter().map(scaled).collect();
-                let (rounds, lambda, mu) = (taubin::ROUNDS, taubin::LAMBDA, taubin::MU);
-                let moved = taubin::taubin(&at, &before.triangles, rounds, lambda, mu);
-                let voxels = moved.iter().map(|p| [0, 1, 2].map(|a| p[a] / spacing[a]));
-                Mesh::from_triangles(voxels.collect(), before.triangles.clone())
-            }
-            Other::Cesn => {
-                let Some(volume) = &piece.volume else {
-                    let problem = "is made from a volume, and this is a mesh";
-                    return Err(Error::parameter("compare", "cesn", problem));
-                };
-                let net = cesn::cesn(
-                    volume,
-                    &piece.inside.select(),
-                    args.border,
-                    params.threshold,
-                    Params::LAPLACIAN_ITERATIONS,
-                    job.progress(),
-                )?;
-                let frame = Frame::straight(volume.frame.dims, [0.0; 3], [1.0; 3]);
-                Mesh::from_triangles(net.positions(&frame), net.triangles)
-            }
-        };
-        all.push((method.name(), mesh));
-    }
-    let voxels = piece.voxels(args.border);
-    let judge = |(name, mesh): &(&'static str, Mesh)| {
-        smooth_error::judge(name, &before, mesh, spacing, voxels, memory, job.progress())
-    };
-    all.iter().map(judge).collect()
 }
 
 /// Smooths a mesh of which nothing is known but the size of a cell: what is left of the method then is
