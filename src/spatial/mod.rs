@@ -2,5 +2,6 @@
 
 pub mod aabb;
 pub mod bvh;
+pub mod delaunay3;
 pub mod local;
 pub mod wide_bvh;
