@@ -178,9 +178,87 @@ pub(super) fn power3d(points: [[f64; 4]; 4], p: [f64; 4]) -> i32 {
     }
 }
 
+/// The centre of the sphere orthogonal to four weighted points `[x, y, z, w]`, as the way to it from the
+/// first: each coordinate exact but for one rounding. None when they lie in one plane.
+pub(crate) fn orthocentre(corners: [[f64; 4]; 4]) -> Option<[f64; 3]> {
+    let places = corners.into_iter().flat_map(|[x, y, z, _]| [x, y, z]);
+    let (low, _) = span(places)?;
+    let weights = corners.into_iter().map(|q| q[3]);
+    let unit = span(weights).map_or(low, |(of_weights, _)| low.min(of_weights.div_euclid(2)));
+    let place = |[x, y, z, _]: [f64; 4]| [x, y, z];
+    let [a, b, c, d] = corners;
+    let own: BigInt = whole(a[3], 2 * unit);
+    let mut edges = rows::<BigInt, 3>([place(b), place(c), place(d)], place(a), unit);
+    for (edge, corner) in edges.iter_mut().zip([b, c, d]) {
+        let square = &edge[0] * &edge[0] + &edge[1] * &edge[1] + &edge[2] * &edge[2];
+        edge[3] = square + &own - whole::<BigInt>(corner[3], 2 * unit);
+    }
+    // Cramer's rule for 2 e.x = |e|^2 + w_a - w_e over the three edges e.
+    let [u, v, w] = &edges;
+    let volume = minor3(u, v, w);
+    if volume.sign() == Sign::NoSign {
+        return None;
+    }
+    let mut offset = [0.0; 3];
+    for axis in 0..3 {
+        let with = |edge: &[BigInt; 4]| {
+            let mut row = edge.clone();
+            row[axis] = edge[3].clone();
+            row
+        };
+        let part = minor3(&with(u), &with(v), &with(w));
+        offset[axis] = ratio(part, &volume, unit - 1);
+    }
+    Some(offset)
+}
+
+/// `above / below * 2^exponent`, cut to 63 bits and rounded.
+fn ratio(above: BigInt, below: &BigInt, exponent: i32) -> f64 {
+    // Quotients of 64 bits or one more: what is cut is below half a unit of the double.
+    let shift = 64 + below.bits() as i64 - above.bits() as i64;
+    let quotient = if shift >= 0 {
+        (above << shift as u64) / below
+    } else {
+        (above >> shift.unsigned_abs()) / below
+    };
+    let cut = quotient.bits().saturating_sub(63);
+    let digits = (&quotient >> cut).magnitude().iter_u64_digits().next();
+    let magnitude = digits.unwrap_or(0) as f64;
+    let signed = if quotient.sign() == Sign::Minus { -magnitude } else { magnitude };
+    // In two steps, as a power of two may be too small or large for a double where the result is not.
+    let exponent = (i64::from(exponent) - shift + cut as i64).clamp(-4000, 4000) as i32;
+    signed * 2f64.powi(exponent / 2) * 2f64.powi(exponent - exponent / 2)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn centres_of_flat_cells_are_exact() {
+        let corner = |x: f64, y: f64, z: f64| [x, y, z, 0.0];
+        // Three corners of a square and the fourth, raised by one part in 2^50: x^2 + y^2 + z^2 = 2 z c.
+        let high = 2f64.powi(-50);
+        let corners = [
+            corner(0.0, 0.0, 0.0),
+            corner(1.0, 0.0, 0.0),
+            corner(0.0, 1.0, 0.0),
+            corner(1.0, 1.0, high),
+        ];
+        // (1, 1, h) is as far from (1/2, 1/2, c) as the origin: 2 h c = h^2.
+        assert_eq!(orthocentre(corners), Some([0.5, 0.5, high / 2.0]));
+        let mut flat = corners;
+        flat[3][2] = 0.0;
+        assert_eq!(orthocentre(flat), None);
+        // A heavier fourth point draws the centre away: 2 h c = h^2 - w.
+        let mut heavy = corners;
+        heavy[3][3] = 2f64.powi(-60);
+        let c = high / 2.0 - 2f64.powi(-61) / high;
+        assert_eq!(orthocentre(heavy), Some([0.5, 0.5, c]));
+        let tiny = corners.map(|p| p.map(|v| v * 2f64.powi(-900)));
+        let [x, _, z] = orthocentre(tiny).expect("not flat");
+        assert_eq!([x, z], [2f64.powi(-901), 2f64.powi(-951)]);
+    }
 
     #[test]
     fn parts_make_the_number_again() {

@@ -1,7 +1,7 @@
 //! Numbers: exact predicates, sums in a fixed order, random numbers by index.
 
 mod double;
-mod exact;
+pub(crate) mod exact;
 pub mod predicates;
 pub mod rng;
 pub mod sums;
