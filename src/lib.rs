@@ -25,6 +25,7 @@ pub mod measure;
 pub mod mesh;
 pub mod numeric;
 pub mod progress;
+pub mod protein;
 pub mod render;
 pub mod report;
 pub mod spatial;

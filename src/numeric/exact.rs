@@ -224,7 +224,11 @@ fn ratio(above: BigInt, below: &BigInt, exponent: i32) -> f64 {
     let cut = quotient.bits().saturating_sub(63);
     let digits = (&quotient >> cut).magnitude().iter_u64_digits().next();
     let magnitude = digits.unwrap_or(0) as f64;
-    let signed = if quotient.sign() == Sign::Minus { -magnitude } else { magnitude };
+    let signed = if quotient.sign() == Sign::Minus {
+        -magnitude
+    } else {
+        magnitude
+    };
     // In two steps, as a power of two may be too small or large for a double where the result is not.
     let exponent = (i64::from(exponent) - shift + cut as i64).clamp(-4000, 4000) as i32;
     signed * 2f64.powi(exponent / 2) * 2f64.powi(exponent - exponent / 2)

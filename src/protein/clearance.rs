@@ -1,6 +1,6 @@
 //! How far a point is from the nearest ball: the clearance that a tunnel is measured by.
 
-use crate::numeric::vector::{length, sub};
+use crate::numeric::vector::{add, dot, length, scale, sub};
 
 /// An atom as a hard ball.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -50,7 +50,9 @@ impl Node {
     fn bound(&self, p: [f64; 3]) -> f64 {
         let mut square = 0.0;
         for axis in 0..3 {
-            let out = (self.low[axis] - p[axis]).max(p[axis] - self.high[axis]).max(0.0);
+            let out = (self.low[axis] - p[axis])
+                .max(p[axis] - self.high[axis])
+                .max(0.0);
             square += out * out;
         }
         square.sqrt() - self.radius
@@ -78,10 +80,17 @@ impl Clearance {
         }
         let mut next = 0;
         while next < nodes.len() {
-            let Node { low, high, start, end, .. } = nodes[next];
+            let Node {
+                low,
+                high,
+                start,
+                end,
+                ..
+            } = nodes[next];
             let (start, end) = (start as usize, end as usize);
             if end - start > LEAF {
-                let widest = |a: &usize, b: &usize| (high[*a] - low[*a]).total_cmp(&(high[*b] - low[*b]));
+                let widest =
+                    |a: &usize, b: &usize| (high[*a] - low[*a]).total_cmp(&(high[*b] - low[*b]));
                 let axis = (0..3).max_by(widest).unwrap_or(0);
                 let half = (end - start) / 2;
                 order[start..end].select_nth_unstable_by(half, |a, b| {
@@ -104,7 +113,7 @@ impl Clearance {
     /// The nearest ball; the first given of those equally near. None without balls.
     pub fn nearest(&self, p: [f64; 3]) -> Option<Near> {
         let mut best: Option<Near> = None;
-        self.visit(p, f64::INFINITY, |near| {
+        self.visit(p, f64::INFINITY, |near, _| {
             let is_better = best.is_none_or(|b| (near.distance, near.ball) < (b.distance, b.ball));
             if is_better {
                 best = Some(near);
@@ -117,17 +126,51 @@ impl Clearance {
     /// The distance to the nearest ball; infinite without any.
     pub fn at(&self, p: [f64; 3]) -> f64 {
         let mut best = f64::INFINITY;
-        self.visit(p, f64::INFINITY, |near| {
+        self.visit(p, f64::INFINITY, |near, _| {
             best = best.min(near.distance);
             best
         });
         best
     }
 
+    /// The least distance along the straight way from `a` to `b`, and the ball it is to: exact but for
+    /// rounding, however long the way is.
+    pub fn along(&self, a: [f64; 3], b: [f64; 3]) -> Near {
+        let middle = scale(add(a, b), 0.5);
+        let half = 0.5 * length(sub(b, a));
+        let mut best = Near {
+            distance: f64::INFINITY,
+            ball: u32::MAX,
+        };
+        // Seen from the middle, what is nearest somewhere on the way is no further than this.
+        self.visit(middle, f64::INFINITY, |near, ball| {
+            let distance = ball.distance(Self::closest_on_way(a, b, ball));
+            if (distance, near.ball) < (best.distance, best.ball) {
+                best = Near {
+                    distance,
+                    ball: near.ball,
+                };
+            }
+            best.distance + half
+        });
+        best
+    }
+
+    /// Where the straight way from `a` to `b` is nearest to a ball.
+    pub fn closest_on_way(a: [f64; 3], b: [f64; 3], ball: &Ball) -> [f64; 3] {
+        let way = sub(b, a);
+        let square = dot(way, way);
+        if square == 0.0 {
+            return a;
+        }
+        let along = (dot(sub(ball.centre, a), way) / square).clamp(0.0, 1.0);
+        add(a, scale(way, along))
+    }
+
     /// The `count` nearest balls, nearest first.
     pub fn several(&self, p: [f64; 3], count: usize) -> Vec<Near> {
         let mut best: Vec<Near> = Vec::with_capacity(count + 1);
-        self.visit(p, f64::INFINITY, |near| {
+        self.visit(p, f64::INFINITY, |near, _| {
             let key = |n: &Near| (n.distance, n.ball);
             let at = best.partition_point(|other| key(other) < key(&near));
             best.insert(at, near);
@@ -142,14 +185,14 @@ impl Clearance {
 
     /// All balls whose surface is within `reach` of `p`, in no particular order.
     pub fn within(&self, p: [f64; 3], reach: f64, found: &mut Vec<u32>) {
-        self.visit(p, reach, |near| {
+        self.visit(p, reach, |near, _| {
             found.push(near.ball);
             reach
         });
     }
 
     /// Shows the balls no further than `reach`, which the visitor may draw in.
-    fn visit(&self, p: [f64; 3], mut reach: f64, mut visitor: impl FnMut(Near) -> f64) {
+    fn visit(&self, p: [f64; 3], mut reach: f64, mut visitor: impl FnMut(Near, &Ball) -> f64) {
         let Some(root) = self.nodes.first() else {
             return;
         };
@@ -167,7 +210,13 @@ impl Clearance {
                 for k in node.start as usize..node.end as usize {
                     let distance = self.balls[k].distance(p);
                     if distance <= reach {
-                        reach = visitor(Near { distance, ball: self.given[k] });
+                        reach = visitor(
+                            Near {
+                                distance,
+                                ball: self.given[k],
+                            },
+                            &self.balls[k],
+                        );
                     }
                 }
                 continue;
@@ -225,17 +274,38 @@ mod tests {
                 let p = [rng.range(-2.0, 3.0), rng.unit(), rng.unit()];
                 let mut all: Vec<Near> = (0u32..)
                     .zip(&balls)
-                    .map(|(ball, b)| Near { distance: b.distance(p), ball })
+                    .map(|(ball, b)| Near {
+                        distance: b.distance(p),
+                        ball,
+                    })
                     .collect();
                 all.sort_by(|a, b| a.distance.total_cmp(&b.distance).then(a.ball.cmp(&b.ball)));
                 assert_eq!(tree.nearest(p), all.first().copied());
-                assert_eq!(tree.at(p), all.first().map_or(f64::INFINITY, |n| n.distance));
+                assert_eq!(
+                    tree.at(p),
+                    all.first().map_or(f64::INFINITY, |n| n.distance)
+                );
                 assert_eq!(tree.several(p, 4), all[..count.min(4)]);
+                let q = [rng.range(-2.0, 3.0), rng.unit(), rng.unit()];
+                let along = tree.along(p, q);
+                let step = |k: usize| add(p, scale(sub(q, p), k as f64 / 256.0));
+                let sampled = (0..=256)
+                    .map(|k| tree.at(step(k)))
+                    .fold(f64::INFINITY, f64::min);
+                let gap = length(sub(q, p)) / 512.0;
+                assert!(along.distance <= sampled + 1e-12, "{along:?} {sampled}");
+                assert!(
+                    count == 0 || along.distance >= sampled - gap,
+                    "{along:?} {sampled}"
+                );
                 let mut within = Vec::new();
                 tree.within(p, 0.4, &mut within);
                 within.sort_unstable();
-                let mut expected: Vec<u32> =
-                    all.iter().filter(|n| n.distance <= 0.4).map(|n| n.ball).collect();
+                let mut expected: Vec<u32> = all
+                    .iter()
+                    .filter(|n| n.distance <= 0.4)
+                    .map(|n| n.ball)
+                    .collect();
                 expected.sort_unstable();
                 assert_eq!(within, expected);
             }

@@ -31,7 +31,9 @@ pub fn orthosphere(corners: [[f64; 4]; 4]) -> Sphere {
     let side = |e: [f64; 3], p: [f64; 4]| dot(e, e) + (a[3] - p[3]);
     let (vw, wu, uv) = (cross(v, w), cross(w, u), cross(u, v));
     let volume = dot(u, vw);
-    let of_box: f64 = (0..3).map(|k| u[k].abs().max(v[k].abs()).max(w[k].abs())).product();
+    let of_box: f64 = (0..3)
+        .map(|k| u[k].abs().max(v[k].abs()).max(w[k].abs()))
+        .product();
     let x = if volume.abs() > FLAT * of_box {
         let sum = add(
             add(scale(vw, side(u, b)), scale(wu, side(v, c))),

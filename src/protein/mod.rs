@@ -1,0 +1,4 @@
+//! Proteins.
+
+pub mod clearance;
+pub mod tunnels;

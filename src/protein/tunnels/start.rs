@@ -1,0 +1,99 @@
+//! Where ways start.
+
+use super::graph::Graph;
+use super::params::Params;
+use super::search::Outside;
+use crate::error::{Error, Fault, Result};
+use crate::numeric::vector::{length, sub};
+
+/// Where ways start.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Start {
+    /// As asked for.
+    pub given: [f64; 3],
+    /// The point used.
+    pub used: [f64; 3],
+    /// The clearance there.
+    pub clearance: f64,
+    /// The cell of the atoms' Delaunay triangulation whose dual vertex it is; none for a point held.
+    cell: Option<u32>,
+}
+
+/// The error of a start that is not inside.
+pub fn outside(point: [f64; 3]) -> Error {
+    let problem = format!("the start {point:?} lies outside of the molecule");
+    let hint = "a larger --start-search may find a place inside";
+    Error::Geometry(Fault::whole(problem).with_hint(hint))
+}
+
+impl Start {
+    /// A start in no triangulation.
+    pub fn alone(given: [f64; 3], clearance: f64) -> Self {
+        Start {
+            given,
+            used: given,
+            clearance,
+            cell: None,
+        }
+    }
+
+    /// The dual vertex of largest clearance within the search radius, of those not outside; the given
+    /// point itself for a radius of 0.
+    pub fn find(
+        graph: &mut Graph,
+        given: [f64; 3],
+        params: &Params,
+        outside_cells: &Outside,
+    ) -> Result<Self> {
+        let mut start = Start::alone(given, graph.width_at(given));
+        if params.start_search > 0.0 {
+            let mut best: Option<(f64, f64, u32)> = None;
+            for cell in 0..graph.triangulation.cells().len() as u32 {
+                if outside_cells.has(cell) {
+                    continue;
+                }
+                let centre = graph.centre(cell);
+                let away = length(sub(centre, given));
+                if away > params.start_search || !away.is_finite() {
+                    continue;
+                }
+                let width = graph.node(cell).width;
+                if best.is_none_or(|(w, a, _)| (width, -away) > (w, -a)) {
+                    best = Some((width, away, cell));
+                }
+            }
+            if let Some((width, _, cell)) = best.filter(|(width, ..)| *width > start.clearance) {
+                start.used = graph.centre(cell);
+                start.clearance = width;
+                start.cell = Some(cell);
+            }
+        }
+        if start.clearance <= 0.0 {
+            return Err(start.in_an_atom(graph));
+        }
+        let cell = start
+            .cell_in(graph)
+            .filter(|cell| !outside_cells.has(*cell));
+        cell.map(|_| start).ok_or_else(|| outside(given))
+    }
+
+    fn in_an_atom(&self, graph: &Graph) -> Error {
+        let depth = -self.clearance;
+        let near = graph.nearest(self.used);
+        let problem = format!("the start {:?} lies {depth:.3} deep in it", self.used);
+        let hint = "a larger --start-search may find a place that is free";
+        let fault = match near {
+            Some(ball) => Fault::element("atom", ball as usize, problem),
+            None => Fault::whole(problem),
+        };
+        Error::Geometry(fault.with_hint(hint))
+    }
+
+    /// The cell of a graph that ways start in.
+    pub fn cell_in(&self, graph: &Graph) -> Option<u32> {
+        // Where it is the dual vertex of a cell here too, that is the cell, wherever the vertex lies.
+        let own = self.cell.filter(|cell| graph.is_centre(*cell, self.used));
+        let cell = own.or_else(|| graph.triangulation.locate(self.used, None))?;
+        Some(cell).filter(|cell| graph.cell(*cell).is_finite())
+    }
+}
