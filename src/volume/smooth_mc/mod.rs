@@ -5,8 +5,9 @@
 //! the octahedron ("diamond") of half a voxel around its first place, or on its edge, no triangle of
 //! any split of the cells' polygons can pass the centre of a voxel, so that the smooth surface stands
 //! for the same volume. (Exhaustive: for all 256 cells and any three corners of a polygon, no centre
-//! lies in the interior of the hull of their octahedra, which touch centres at their tips alone; they
-//! are kept smaller by a millionth. A test repeats the search.)
+//! lies in the interior of the hull of their octahedra, nor does one where the corners of a cell are
+//! shared out among labels; as octahedra touch centres at their tips, they are kept smaller by a
+//! millionth. The tests make the search.)
 //!
 //! Two energies are minimised under that constraint. `laplacian` is the paper's: each vertex goes to
 //! the mean of its neighbours and is clipped. `bilaplacian` (`fair`) is smoother, for it does not

@@ -1,3 +1,4 @@
+mod diamond;
 mod thin;
 
 use super::*;
