@@ -33,9 +33,8 @@ pub struct SmoothError {
     /// least bending within the diamond, after a thousand steps; in the smallest spacing. Null for a dual
     /// surface, which has no such counterpart.
     pub from_fairest: Option<f64>,
-    /// Root mean square of the angle between chords of the curves in which the fairest surface meets the planes of voxel
-    /// centres, in degrees.
-    /// Null where there is no curve.
+    /// Root mean square of the angle between chords of the curves in which the fairest surface meets
+    /// the planes of voxel centres, in degrees; null where there is no curve.
     pub fairest_turning_deg: Option<f64>,
 }
 

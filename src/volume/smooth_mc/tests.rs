@@ -70,6 +70,29 @@ fn a_ball_becomes_round_and_keeps_its_volume() {
     assert!(stats.max_displacement <= 0.5);
 }
 
+#[test]
+fn nothing_takes_no_steps() {
+    let nothing = shape(4, |_| false);
+    let surface = extract(&nothing, &Select::Set, Border::Closed, &Silent).expect("no surface");
+    let mesh = crate::mesh::Mesh::default();
+    for energy in [Energy::Laplacian, Energy::Bilaplacian] {
+        let params = Params {
+            energy,
+            ..Params::DEFAULT
+        };
+        let (_, _, stats) =
+            smooth(&surface, None, [1.0; 3], &params, &Silent).expect("nothing smooth");
+        let (_, (_, _, of_net)) =
+            smooth_net(&nothing, &Select::Set, Border::Closed, &params, &Silent).expect("no net");
+        let (_, in_boxes) =
+            smooth_in_boxes(&mesh, [1.0; 3], &params, &Silent).expect("nothing in boxes");
+        for stats in [stats, of_net, in_boxes] {
+            assert_eq!((stats.iterations, stats.stop_reason), (0, Stop::Still));
+            assert_eq!((stats.turning_before_deg, stats.awake_share), (None, 0.0));
+        }
+    }
+}
+
 /// The ball is large enough for several runs of chunks where there are several threads.
 #[test]
 fn any_number_of_threads_smooths_alike() {
