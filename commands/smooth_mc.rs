@@ -240,7 +240,7 @@ fn of_volume(
     memory: u64,
 ) -> Result<Found<Asked, Stats>> {
     place(&mut volume.frame, args);
-    isosurface::check_numbers(&volume).map_err(Error::Geometry)?;
+    volume.check_numbers().map_err(Error::Geometry)?;
     let what = select::inside(&volume, args)?;
     let one = what.select();
     let dual = params.constraint == Constraint::CellCenter;

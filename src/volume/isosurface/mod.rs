@@ -19,7 +19,7 @@ pub(in crate::volume) mod slab;
 mod tests;
 mod triangulate;
 
-use crate::error::{Error, Fault, Result};
+use crate::error::{Error, Result};
 use crate::numeric::vector::{Vec3, add, scale};
 use crate::progress::Progress;
 use crate::trade::named;
@@ -638,25 +638,4 @@ pub fn inside(volume: &Volume, select: &Select) -> BitGrid {
             });
     }
     all
-}
-
-/// Refuses values that are no numbers: they are neither inside nor outside.
-pub fn check_numbers(volume: &Volume) -> Result<(), Fault> {
-    let nan = match &volume.data {
-        Data::F32(v) => v.par_iter().position_first(|v| v.is_nan()),
-        Data::F64(v) => v.par_iter().position_first(|v| v.is_nan()),
-        _ => None,
-    };
-    match nan {
-        None => Ok(()),
-        Some(at) => {
-            let [nx, ny, _] = volume.frame.dims;
-            let voxel = [at % nx, at / nx % ny, at / (nx * ny)];
-            Err(Fault::element(
-                "voxel",
-                at,
-                format!("the value at {voxel:?} is not a number"),
-            ))
-        }
-    }
 }
