@@ -45,10 +45,7 @@ pub fn lattice_mesh(
     offsets: &[Vec3],
     triangles: &[[u32; 3]],
 ) -> Mesh {
-    let at = |(place, offset): (&[i32; 3], &Vec3)| {
-        std::array::from_fn(|a| (0.5 * f64::from(place[a]) + offset[a]) * metric[a])
-    };
-    let positions = surface.places.iter().zip(offsets).map(at).collect();
+    let positions = surface.on_grid(metric, |v| offsets[v]);
     Mesh::from_triangles(positions, triangles.to_vec())
 }
 

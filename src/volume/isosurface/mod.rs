@@ -183,4 +183,30 @@ impl Surface {
             })
             .collect()
     }
+
+    /// Where vertices are on the grid: in voxels from the centre of voxel (0, 0, 0), times `metric`, each
+    /// moved by so many voxels.
+    pub fn on_grid(&self, metric: Vec3, moved: impl Fn(usize) -> Vec3 + Sync) -> Vec<Vec3> {
+        self.on_grid_from(|_| [0; 3], metric, moved)
+    }
+
+    /// As [`Surface::on_grid`], each vertex from a place of its own, which is doubled as its own is: a part
+    /// far out on the grid keeps its digits.
+    pub(in crate::volume) fn on_grid_from(
+        &self,
+        origin: impl Fn(usize) -> [i32; 3] + Sync,
+        metric: Vec3,
+        moved: impl Fn(usize) -> Vec3 + Sync,
+    ) -> Vec<Vec3> {
+        (0..self.len())
+            .into_par_iter()
+            .with_min_len(1 << 12)
+            .map(|v| {
+                let (place, from, offset) = (self.places[v], origin(v), moved(v));
+                std::array::from_fn(|a| {
+                    (0.5 * f64::from(place[a] - from[a]) + offset[a]) * metric[a]
+                })
+            })
+            .collect()
+    }
 }

@@ -270,7 +270,7 @@ pub fn smooth(
     progress.stage("split", 0);
     let triangles = match given {
         Some(triangles) => triangles.to_vec(),
-        None => surface.triangles(&placed(surface, metric, |v| offsets[v])),
+        None => surface.triangles(&surface.on_grid(metric, |v| offsets[v])),
     };
     let after = match params.energy {
         Energy::Laplacian => parts.enclosed_by(surface, &triangles, |v| offsets[v]),
@@ -287,18 +287,6 @@ pub fn smooth(
     let volumes = [&before, &after];
     let stats = stats(surface, params, &outcome, &offsets, &parts, volumes, turned);
     Ok((offsets, triangles, stats))
-}
-
-/// Places in the smallest spacing.
-fn placed(surface: &Surface, metric: Vec3, offset: impl Fn(usize) -> Vec3 + Sync) -> Vec<Vec3> {
-    (0..surface.len())
-        .into_par_iter()
-        .with_min_len(1 << 12)
-        .map(|v| {
-            let (place, moved) = (surface.places[v], offset(v));
-            std::array::from_fn(|a| (0.5 * f64::from(place[a]) + moved[a]) * metric[a])
-        })
-        .collect()
 }
 
 /// Root mean square of the angle between one chord and the next of the curves in which a surface meets

@@ -38,7 +38,7 @@ struct Figures {
 fn figures(surface: &Surface, params: &Params, outward: fn(Vec3) -> Vec3) -> Figures {
     let (offsets, triangles, stats) =
         smooth(surface, None, [1.0; 3], params, &Silent).expect("a smooth surface");
-    let positions = placed(surface, [1.0; 3], |v| offsets[v]);
+    let positions = surface.on_grid([1.0; 3], |v| offsets[v]);
     let farthest = offsets
         .iter()
         .map(|o| dot(*o, *o))
@@ -55,7 +55,7 @@ fn figures(surface: &Surface, params: &Params, outward: fn(Vec3) -> Vec3) -> Fig
 
 /// What marching cubes leaves of the staircase: all.
 fn raw(surface: &Surface, outward: fn(Vec3) -> Vec3) -> f64 {
-    let places = placed(surface, [1.0; 3], |_| [0.0; 3]);
+    let places = surface.on_grid([1.0; 3], |_| [0.0; 3]);
     normal_rms(&places, &surface.triangles(&places), outward)
 }
 
@@ -193,7 +193,7 @@ fn quarter_turns_and_mirror_images_give_the_turned_surface() {
         data: Data::U8(values),
     };
     let surface = extract(&volume, &Select::Set, Border::Closed, &Silent).expect("a surface");
-    let positions = placed(&surface, [1.0; 3], |_| [0.0; 3]);
+    let positions = surface.on_grid([1.0; 3], |_| [0.0; 3]);
     let mesh = Mesh::from_triangles(positions.clone(), surface.triangles(&positions));
     let smoothed = |mesh: &Mesh, params: &Params| {
         let lattice = lattice::recover(mesh, Given::default(), &Silent).expect("a lattice");
