@@ -67,9 +67,9 @@ pub struct VolumeStats {
     voxels: u64,
     /// Voxels that are not 0.
     set: u64,
-    /// Smallest value, null in a volume without voxels.
+    /// Smallest value, null where there is no number or it is infinite.
     min: Option<f64>,
-    /// Largest value, null in a volume without voxels.
+    /// Largest value, null where there is no number or it is infinite.
     max: Option<f64>,
 }
 
@@ -119,6 +119,7 @@ fn look(job: &mut Job) -> Result<Found<Params, Stats>> {
         }
         Content::Volume(volume) => {
             job.progress().stage("count", 0);
+            job.warn(volume.warnings());
             let stats = volume_stats(&volume);
             summary += &format!(", {} set", stats.set);
             Stats::Volume(stats)

@@ -88,7 +88,7 @@ pub fn run(args: &Args) -> Result<Exit> {
 fn isosurface(job: &mut Job, args: &Args) -> Result<Found<Asked, Stats>> {
     job.expect_output(&[Kind::Mesh])?;
     let volume = job.read_volume()?;
-    isosurface::check_numbers(&volume).map_err(Error::Geometry)?;
+    volume.check_numbers().map_err(Error::Geometry)?;
     let iso = args.iso.filter(|_| !volume.is_binary());
     let select = match iso {
         Some(iso) => Select::AtLeast(iso),

@@ -48,7 +48,7 @@ pub struct Args {
     budget: Option<f64>,
     /// The cost that orders settings: `wall`, seconds by the clock; `cpu`, processor seconds;
     /// `memory`, bytes
-    #[arg(long, default_value = "wall", value_parser = named(Cost::NAMES, Cost::from_name))]
+    #[arg(long, default_value = tradeoff::Params::DEFAULT.cost.name(), value_parser = named(Cost::NAMES, Cost::from_name))]
     cost: Cost,
     /// Name the cheapest setting whose verified error is at most X, in the unit of the table; exit
     /// with 1 when there is none

@@ -268,6 +268,11 @@ impl Tally {
         self.first = self.first.or(later.first);
     }
 
+    /// The place of the first.
+    pub fn first(self) -> Option<u64> {
+        self.first
+    }
+
     /// Whether there is none.
     pub fn is_empty(self) -> bool {
         self.count == 0

@@ -1,7 +1,8 @@
 //! Other surfaces beside the smooth one.
 
+use super::Args;
+use super::input::Piece;
 use super::result::Directions;
-use super::{Args, Piece};
 use crate::job::Job;
 use scantle::error::{Error, Result};
 use scantle::io::read_mesh;

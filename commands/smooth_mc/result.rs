@@ -1,6 +1,6 @@
 //! What is reported of a smooth surface.
 
-use super::Piece;
+use super::input::Piece;
 use scantle::measure::smooth_error::{Judged, SmoothError};
 use scantle::mesh::Mesh;
 use scantle::numeric::vector::length;

@@ -405,19 +405,11 @@ impl Runs {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::io::written_volume::{Parsed, damaged, parsed, written};
     use proptest::prelude::*;
 
-    fn parse(bytes: &[u8]) -> Result<(Volume, Vec<Warning>), Fault> {
-        let source = Source::from_bytes("a.binvox", bytes.to_vec()).unwrap();
-        let mut warnings = Vec::new();
-        let volume = read(&source, &mut warnings).map_err(Refusal::fault)?;
-        Ok((volume, warnings))
-    }
-
-    fn written(volume: &Volume) -> Vec<u8> {
-        let mut bytes = Vec::new();
-        write(volume, &mut bytes).unwrap();
-        bytes
+    fn parse(bytes: &[u8]) -> Parsed {
+        parsed("a.binvox", bytes, read)
     }
 
     /// Bits by a rule, in a frame whose numbers are exact in binary.
@@ -444,7 +436,7 @@ mod tests {
                 (i ^ seed).wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 61 < share
             });
             prop_assert_eq!(refusal(&volume), None);
-            let (back, warnings) = parse(&written(&volume)).unwrap();
+            let (back, warnings) = parse(&written(&volume, write)).unwrap();
             prop_assert!(warnings.is_empty());
             prop_assert_eq!(back.data, volume.data);
             prop_assert_eq!(back.frame.dims, volume.frame.dims);
@@ -456,12 +448,8 @@ mod tests {
 
         #[test]
         fn any_bytes_are_read_or_refused(cut in 0usize..90, at in 0usize..90, byte in any::<u8>()) {
-            let mut bytes = written(&cube(5, |[x, y, _]| x > y));
-            if let Some(place) = bytes.get_mut(at) {
-                *place = byte;
-            }
-            bytes.truncate(bytes.len().saturating_sub(cut));
-            let _ = parse(&bytes);
+            let bytes = written(&cube(5, |[x, y, _]| x > y), write);
+            let _ = parse(&damaged(bytes, at, byte, cut));
         }
     }
 
@@ -481,7 +469,7 @@ mod tests {
             .filter(|[x, y, z]| grid.get(*x, *y, *z))
             .collect();
         assert_eq!(set, [[1, 0, 0], [0, 1, 0], [1, 1, 0]]);
-        assert_eq!(written(&volume), bytes);
+        assert_eq!(written(&volume, write), bytes);
     }
 
     #[test]

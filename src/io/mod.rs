@@ -34,6 +34,8 @@ mod xml;
 
 #[cfg(test)]
 mod roundtrip;
+#[cfg(test)]
+mod written_volume;
 
 use crate::error::{Error, Fault, Result};
 use crate::image::samples::Image;

@@ -358,51 +358,10 @@ fn expand_row(row: &[u64], nx: usize, out: &mut Vec<u8>) {
 }
 
 #[cfg(test)]
-pub(super) mod tests {
+mod tests {
     use super::*;
-    use crate::volume::Frame;
+    use crate::io::written_volume::{raw, volumes};
     use proptest::prelude::*;
-
-    /// Volumes of every sample type with frames along the axes, turned or sheared.
-    pub fn volumes() -> impl Strategy<Value = Volume> {
-        let dims = (1usize..70, 1usize..6, 1usize..12).prop_map(|(x, y, z)| [x, y, z]);
-        let place = prop::array::uniform3(-1e3..1e3f64);
-        let steps = prop::array::uniform3(1e-3..1e3f64);
-        (dims, place, steps, 0usize..12, any::<u64>()).prop_map(
-            |(dims, origin, steps, kind, seed)| {
-                let mut frame = Frame::straight(dims, origin, steps);
-                if seed % 3 == 0 {
-                    frame.axes[0] = [0.6 * steps[0], 0.8 * steps[0], 0.0];
-                    frame.axes[1] = [-0.8 * steps[1], 0.6 * steps[1], 0.0];
-                }
-                let n = frame.len();
-                let mut state = seed;
-                let bytes: Vec<u8> = (0..n * 8)
-                    .map(|_| {
-                        state = state.wrapping_mul(6364136223846793005).wrapping_add(1);
-                        (state >> 56) as u8
-                    })
-                    .collect();
-                let data = match SampleType::ALL.get(kind) {
-                    Some(sample) => {
-                        decode(&bytes[..n * sample.bytes()], *sample, ByteOrder::Little)
-                    }
-                    None => {
-                        let bits: Vec<u8> = bytes[..n].iter().map(|b| b & 1).collect();
-                        Data::Bits(pack_bits(&bits, dims))
-                    }
-                };
-                Volume { frame, data }
-            },
-        )
-    }
-
-    /// Raw little-endian bytes of the samples: what two volumes of equal content agree in, NaN included.
-    pub fn raw(volume: &Volume) -> Vec<u8> {
-        let mut bytes = Vec::new();
-        write_raw(volume, &mut bytes).unwrap();
-        bytes
-    }
 
     proptest! {
         #[test]

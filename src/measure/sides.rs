@@ -101,9 +101,12 @@ mod tests {
     use super::*;
     use crate::measure::smooth_error::lattice_mesh;
     use crate::numeric::rng::Rng;
+    use crate::numeric::vector::Vec3;
     use crate::progress::Silent;
     use crate::volume::Frame;
-    use crate::volume::isosurface::{Border, Labels, Select, extract, extract_labels, inside};
+    use crate::volume::isosurface::{
+        Border, Labels, Select, Surface, extract, extract_labels, inside,
+    };
     use crate::volume::smooth_mc::region::Constraint;
     use crate::volume::smooth_mc::{Energy, Params as Smoothing, Thin, smooth};
 
@@ -133,6 +136,21 @@ mod tests {
         let mesh = lattice_mesh(&surface, [1.0; 3], &offsets, &triangles);
         let inside = inside(volume, &Select::Set);
         on_wrong_side(&inside, &mesh, 1 << 30, &Silent).expect("a voxelization")
+    }
+
+    /// Voxels of a label, and how many lie on another side of the walls around it.
+    fn of_label(
+        volume: &Volume,
+        label: usize,
+        surface: &Surface,
+        offsets: &[Vec3],
+        triangles: &[[u32; 3]],
+    ) -> (u64, u64) {
+        let own = surface.triangles_around(label as u16, triangles);
+        let mesh = lattice_mesh(surface, [1.0; 3], offsets, &own);
+        let inside = inside(volume, &Select::Equal(label as f64));
+        let wrong = on_wrong_side(&inside, &mesh, 1 << 30, &Silent);
+        (inside.count(), wrong.expect("a voxelization"))
     }
 
     #[test]
@@ -175,16 +193,9 @@ mod tests {
                 let (offsets, triangles, stats) =
                     smooth(&surface, None, [1.0; 3], &params, &Silent).expect("smooth walls");
                 for label in 1..kinds {
-                    let own = surface.triangles_around(label as u16, &triangles);
-                    let mesh = lattice_mesh(&surface, [1.0; 3], &offsets, &own);
-                    let inside = inside(&volume, &Select::Equal(label as f64));
-                    let found = on_wrong_side(&inside, &mesh, 1 << 30, &Silent);
-                    assert_eq!(
-                        found.expect("a voxelization"),
-                        0,
-                        "round {round}, label {label}"
-                    );
-                    assert_eq!(stats.parts[label].voxels, Some(inside.count() as i64));
+                    let (voxels, wrong) = of_label(&volume, label, &surface, &offsets, &triangles);
+                    assert_eq!(wrong, 0, "round {round}, label {label}");
+                    assert_eq!(stats.parts[label].voxels, Some(voxels as i64));
                 }
             }
         }
@@ -211,18 +222,10 @@ mod tests {
                 offset.map(|c| c * share)
             };
             let offsets: Vec<_> = (0..surface.len()).map(corner).collect();
-            let places = lattice_mesh(&surface, [1.0; 3], &offsets, &[]).positions;
-            let triangles = surface.triangles(&places);
+            let triangles = surface.triangles(&surface.on_grid([1.0; 3], |v| offsets[v]));
             for label in 1..kinds {
-                let own = surface.triangles_around(label as u16, &triangles);
-                let mesh = lattice_mesh(&surface, [1.0; 3], &offsets, &own);
-                let inside = inside(&volume, &Select::Equal(label as f64));
-                let found = on_wrong_side(&inside, &mesh, 1 << 30, &Silent);
-                assert_eq!(
-                    found.expect("a voxelization"),
-                    0,
-                    "round {round}, label {label}"
-                );
+                let (_, wrong) = of_label(&volume, label, &surface, &offsets, &triangles);
+                assert_eq!(wrong, 0, "round {round}, label {label}");
             }
         }
     }

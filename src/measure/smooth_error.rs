@@ -33,9 +33,8 @@ pub struct SmoothError {
     /// least bending within the diamond, after a thousand steps; in the smallest spacing. Null for a dual
     /// surface, which has no such counterpart.
     pub from_fairest: Option<f64>,
-    /// Root mean square of the angle between chords of the curves in which the fairest surface meets the planes of voxel
-    /// centres, in degrees.
-    /// Null where there is no curve.
+    /// Root mean square of the angle between chords of the curves in which the fairest surface meets
+    /// the planes of voxel centres, in degrees; null where there is no curve.
     pub fairest_turning_deg: Option<f64>,
 }
 
@@ -46,10 +45,7 @@ pub fn lattice_mesh(
     offsets: &[Vec3],
     triangles: &[[u32; 3]],
 ) -> Mesh {
-    let at = |(place, offset): (&[i32; 3], &Vec3)| {
-        std::array::from_fn(|a| (0.5 * f64::from(place[a]) + offset[a]) * metric[a])
-    };
-    let positions = surface.places.iter().zip(offsets).map(at).collect();
+    let positions = surface.on_grid(metric, |v| offsets[v]);
     Mesh::from_triangles(positions, triangles.to_vec())
 }
 

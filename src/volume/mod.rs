@@ -2,6 +2,7 @@
 
 pub mod bits;
 pub mod isosurface;
+mod numbers;
 pub mod octree;
 pub mod smooth_mc;
 pub mod surface;

@@ -1,7 +1,7 @@
 use super::*;
 use crate::error::Error;
 use crate::io::samples::pack_bits;
-use crate::io::samples::tests::{raw, volumes};
+use crate::io::written_volume::{Parsed, damaged, parsed, raw, volumes, written};
 use crate::numeric::vector::Vec3;
 use crate::volume::Frame;
 use proptest::prelude::*;
@@ -147,11 +147,8 @@ impl File {
     }
 }
 
-fn parse(bytes: &[u8]) -> Result<(Volume, Vec<Warning>), Fault> {
-    let source = Source::from_bytes("a.nii", bytes.to_vec()).unwrap();
-    let mut warnings = Vec::new();
-    let volume = read(&source, &mut warnings).map_err(Refusal::fault)?;
-    Ok((volume, warnings))
+fn parse(bytes: &[u8]) -> Parsed {
+    parsed("a.nii", bytes, read)
 }
 
 /// Where a voxel is.
@@ -679,9 +676,7 @@ fn samples_that_grow_by_scaling_count_as_what_they_become() {
 proptest! {
     #[test]
     fn what_is_written_comes_back(volume in volumes()) {
-        let mut bytes = Vec::new();
-        write(&volume, &mut bytes).unwrap();
-        let (back, warnings) = parse(&bytes).unwrap();
+        let (back, warnings) = parse(&written(&volume, write)).unwrap();
         prop_assert!(warnings.is_empty());
         prop_assert_eq!(back.frame, volume.frame);
         prop_assert_eq!(raw(&back), raw(&volume));
@@ -691,12 +686,8 @@ proptest! {
     fn any_bytes_are_read_or_refused(
         two in any::<bool>(), cut in 0usize..600, at in 0usize..600, byte in any::<u8>()
     ) {
-        let mut bytes = File { version: 1 + usize::from(two), codes: [1, 1], ..small() }.bytes();
-        if let Some(place) = bytes.get_mut(at) {
-            *place = byte;
-        }
-        bytes.truncate(bytes.len().saturating_sub(cut));
-        let _ = parse(&bytes);
+        let bytes = File { version: 1 + usize::from(two), codes: [1, 1], ..small() }.bytes();
+        let _ = parse(&damaged(bytes, at, byte, cut));
     }
 }
 

@@ -140,12 +140,11 @@ pub fn write(volume: &Volume, out: &mut dyn Write) -> io::Result<()> {
 mod tests {
     use super::*;
     use crate::error::Fault;
-    use crate::io::samples::tests::{raw, volumes};
+    use crate::io::written_volume::{damaged, parsed, raw, twelve, volumes, written};
     use proptest::prelude::*;
 
     fn parse(bytes: &[u8]) -> Result<Volume, Fault> {
-        let source = Source::from_bytes("a.npy", bytes.to_vec()).unwrap();
-        read(&source, &mut Vec::new()).map_err(Refusal::fault)
+        parsed("a.npy", bytes, read).map(|(volume, _)| volume)
     }
 
     /// An array of version 1 by its header text.
@@ -165,8 +164,7 @@ mod tests {
     proptest! {
         #[test]
         fn what_is_written_comes_back(volume in volumes()) {
-            let mut bytes = Vec::new();
-            write(&volume, &mut bytes).unwrap();
+            let bytes = written(&volume, write);
             prop_assert_eq!((bytes.len() as u64 - samples::raw_length(&volume)) % 64, 0);
             let back = parse(&bytes).unwrap();
             prop_assert_eq!(back.frame.dims, volume.frame.dims);
@@ -176,17 +174,7 @@ mod tests {
 
         #[test]
         fn any_bytes_are_read_or_refused(cut in 0usize..160, at in 0usize..160, byte in any::<u8>()) {
-            let volume = Volume {
-                frame: Frame::straight([3, 2, 2], [0.0; 3], [1.0; 3]),
-                data: Data::U16((0..12).collect()),
-            };
-            let mut bytes = Vec::new();
-            write(&volume, &mut bytes).unwrap();
-            if let Some(place) = bytes.get_mut(at) {
-                *place = byte;
-            }
-            bytes.truncate(bytes.len().saturating_sub(cut));
-            let _ = parse(&bytes);
+            let _ = parse(&damaged(written(&twelve(), write), at, byte, cut));
         }
     }
 

@@ -1,13 +1,10 @@
 use super::*;
-use crate::io::samples::tests::{raw, volumes};
+use crate::io::written_volume::{Parsed, damaged, parsed, raw, twelve, volumes, written};
 use crate::volume::{Data, Frame};
 use proptest::prelude::*;
 
-fn parse(bytes: &[u8]) -> Result<(Volume, Vec<Warning>), Fault> {
-    let source = Source::from_bytes("a.nrrd", bytes.to_vec()).unwrap();
-    let mut warnings = Vec::new();
-    let volume = read(&source, &mut warnings).map_err(Refusal::fault)?;
-    Ok((volume, warnings))
+fn parse(bytes: &[u8]) -> Parsed {
+    parsed("a.nrrd", bytes, read)
 }
 
 fn with(fields: &str, data: &[u8]) -> Result<(Volume, Vec<Warning>), Fault> {
@@ -17,9 +14,7 @@ fn with(fields: &str, data: &[u8]) -> Result<(Volume, Vec<Warning>), Fault> {
 proptest! {
     #[test]
     fn what_is_written_comes_back(volume in volumes()) {
-        let mut bytes = Vec::new();
-        write(&volume, &mut bytes).unwrap();
-        let (back, warnings) = parse(&bytes).unwrap();
+        let (back, warnings) = parse(&written(&volume, write)).unwrap();
         prop_assert!(warnings.is_empty());
         prop_assert_eq!(back.frame, volume.frame);
         prop_assert_eq!(raw(&back), raw(&volume));
@@ -28,17 +23,7 @@ proptest! {
 
     #[test]
     fn any_bytes_are_read_or_refused(cut in 0usize..400, at in 0usize..400, byte in any::<u8>()) {
-        let volume = Volume {
-            frame: Frame::straight([3, 2, 2], [0.5; 3], [1.0, 2.0, 3.0]),
-            data: Data::U16((0..12).collect()),
-        };
-        let mut bytes = Vec::new();
-        write(&volume, &mut bytes).unwrap();
-        if let Some(place) = bytes.get_mut(at) {
-            *place = byte;
-        }
-        bytes.truncate(bytes.len().saturating_sub(cut));
-        let _ = parse(&bytes);
+        let _ = parse(&damaged(written(&twelve(), write), at, byte, cut));
     }
 }
 

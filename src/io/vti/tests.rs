@@ -1,17 +1,15 @@
 use super::*;
-use crate::error::Fault;
 use crate::io::base64::tests::encoded;
 use crate::io::samples::ByteOrder;
-use crate::io::samples::tests::{raw, volumes};
+use crate::io::written_volume::{
+    Parsed, damaged, parsed, raw, same_axes, twelve, volumes, written,
+};
 use crate::numeric::vector::{Vec3, length, sub};
 use crate::volume::Frame;
 use proptest::prelude::*;
 
-fn parse(bytes: &[u8]) -> Result<(Volume, Vec<Warning>), Fault> {
-    let source = Source::from_bytes("a.vti", bytes.to_vec()).unwrap();
-    let mut warnings = Vec::new();
-    let volume = read(&source, &mut warnings).map_err(Refusal::fault)?;
-    Ok((volume, warnings))
+fn parse(bytes: &[u8]) -> Parsed {
+    parsed("a.vti", bytes, read)
 }
 
 fn refusal(text: &str) -> String {
@@ -510,16 +508,11 @@ fn no_room_is_made_for_what_is_not_there() {
 proptest! {
     #[test]
     fn what_is_written_comes_back(volume in volumes()) {
-        let mut bytes = Vec::new();
-        write(&volume, &mut bytes).unwrap();
-        let (back, warnings) = parse(&bytes).unwrap();
+        let (back, warnings) = parse(&written(&volume, write)).unwrap();
         prop_assert!(warnings.is_empty());
         prop_assert_eq!(back.frame.dims, volume.frame.dims);
-        let mut size = length(volume.frame.origin);
-        for (a, b) in back.frame.axes.iter().zip(volume.frame.axes) {
-            prop_assert!(length(sub(*a, b)) <= 4.0 * f64::EPSILON * length(b));
-            size += length(b);
-        }
+        prop_assert!(same_axes(&back.frame, &volume.frame));
+        let size = length(volume.frame.origin) + volume.frame.axes.map(length).iter().sum::<f64>();
         let moved = length(sub(back.frame.origin, volume.frame.origin));
         prop_assert!(moved <= 8.0 * f64::EPSILON * size, "{} of {}", moved, size);
         prop_assert_eq!(raw(&back), raw(&volume));
@@ -527,17 +520,7 @@ proptest! {
 
     #[test]
     fn any_bytes_are_read_or_refused(cut in 0usize..400, at in 0usize..700, byte in any::<u8>()) {
-        let volume = Volume {
-            frame: Frame::straight([3, 2, 2], [0.5; 3], [1.0, 2.0, 3.0]),
-            data: Data::U16((0..12).collect()),
-        };
-        let mut bytes = Vec::new();
-        write(&volume, &mut bytes).unwrap();
-        if let Some(place) = bytes.get_mut(at) {
-            *place = byte;
-        }
-        bytes.truncate(bytes.len().saturating_sub(cut));
-        let _ = parse(&bytes);
+        let _ = parse(&damaged(written(&twelve(), write), at, byte, cut));
     }
 }
 

@@ -10,6 +10,7 @@ pub use grid::{Axis, Grid, Idle};
 
 use crate::progress::Progress;
 use crate::report::Modelled;
+use crate::trade::named;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -51,20 +52,7 @@ pub enum Cost {
     Memory,
 }
 
-impl Cost {
-    /// The names of all costs, as the command line writes them.
-    pub const NAMES: &'static [&'static str] = &["wall", "cpu", "memory"];
-
-    /// The cost of a name.
-    pub fn from_name(name: &str) -> Option<Self> {
-        match name {
-            "wall" => Some(Cost::Wall),
-            "cpu" => Some(Cost::Cpu),
-            "memory" => Some(Cost::Memory),
-            _ => None,
-        }
-    }
-}
+named!(Cost { Wall = "wall", Cpu = "cpu", Memory = "memory" });
 
 /// What one run took and found.
 #[derive(Debug, Clone, PartialEq)]

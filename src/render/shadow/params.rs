@@ -2,6 +2,7 @@
 
 use crate::error::{Error, Result};
 use crate::numeric::vector::{cross, length, normalize, sub};
+use crate::trade::named;
 use crate::volume::voxelize::{self, Mode, Storage};
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -18,29 +19,7 @@ pub enum Method {
     Exact,
 }
 
-impl Method {
-    /// The names of all values.
-    pub const NAMES: &'static [&'static str] = &["octree", "dda", "exact"];
-
-    /// The name of this value.
-    pub fn name(self) -> &'static str {
-        match self {
-            Method::Octree => "octree",
-            Method::Dda => "dda",
-            Method::Exact => "exact",
-        }
-    }
-
-    /// The value of a name.
-    pub fn from_name(name: &str) -> Option<Self> {
-        match name {
-            "octree" => Some(Method::Octree),
-            "dda" => Some(Method::Dda),
-            "exact" => Some(Method::Exact),
-            _ => None,
-        }
-    }
-}
+named!(Method { Octree = "octree", Dda = "dda", Exact = "exact" });
 
 /// What a ray through voxels does before it has left those of the surface it starts on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
@@ -52,27 +31,7 @@ pub enum Near {
     Skip,
 }
 
-impl Near {
-    /// The names of all values.
-    pub const NAMES: &'static [&'static str] = &["skip", "exact"];
-
-    /// The name of this value.
-    pub fn name(self) -> &'static str {
-        match self {
-            Near::Exact => "exact",
-            Near::Skip => "skip",
-        }
-    }
-
-    /// The value of a name.
-    pub fn from_name(name: &str) -> Option<Self> {
-        match name {
-            "exact" => Some(Near::Exact),
-            "skip" => Some(Near::Skip),
-            _ => None,
-        }
-    }
-}
+named!(Near { Skip = "skip", Exact = "exact" });
 
 /// A ball that gives light, in the mesh's unit.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]

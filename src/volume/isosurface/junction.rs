@@ -1,7 +1,8 @@
 //! Cells in which three labels or more meet.
 
 use super::cases::{FACES, axis_of, edge_between, link, slot, step_code};
-use super::{NONE, Part, Surface, too_many};
+use super::extract::{Part, too_many};
+use super::{NONE, Surface};
 use crate::error::Result;
 use std::collections::BTreeMap;
 

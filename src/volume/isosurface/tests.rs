@@ -3,7 +3,7 @@ use crate::mesh::Mesh;
 use crate::mesh::topology::topology;
 use crate::numeric::rng::Rng;
 use crate::progress::Silent;
-use crate::volume::Data;
+use crate::volume::{Data, Volume};
 
 fn volume(dims: [usize; 3], inside: impl Fn([usize; 3]) -> bool) -> Volume {
     let mut v = Vec::new();

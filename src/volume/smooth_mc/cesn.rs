@@ -68,12 +68,19 @@ pub fn cesn(
     max_iterations: u32,
     progress: &dyn Progress,
 ) -> Result<Net> {
-    let mut net = Net::default();
+    let mut net = Net {
+        stop: Stop::Still,
+        ..Net::default()
+    };
     if volume.frame.is_empty() {
         return Ok(net);
     }
     let extent = Extent::new(volume.frame.dims, border == Border::Closed);
     let cells = find_cells(volume, select, &extent, progress);
+    if cells.is_empty() {
+        return Ok(net);
+    }
+    net.stop = Stop::MaxIterations;
     if cells.len() >= NONE as usize {
         return Err(Error::Limit {
             what: "the surface net".into(),

@@ -5,8 +5,9 @@
 //! the octahedron ("diamond") of half a voxel around its first place, or on its edge, no triangle of
 //! any split of the cells' polygons can pass the centre of a voxel, so that the smooth surface stands
 //! for the same volume. (Exhaustive: for all 256 cells and any three corners of a polygon, no centre
-//! lies in the interior of the hull of their octahedra, which touch centres at their tips alone; they
-//! are kept smaller by a millionth. A test repeats the search.)
+//! lies in the interior of the hull of their octahedra, nor does one where the corners of a cell are
+//! shared out among labels; as octahedra touch centres at their tips, they are kept smaller by a
+//! millionth. The tests make the search.)
 //!
 //! Two energies are minimised under that constraint. `laplacian` is the paper's: each vertex goes to
 //! the mean of its neighbours and is clipped. `bilaplacian` (`fair`) is smoother, for it does not
@@ -160,6 +161,16 @@ struct Outcome {
     stop: Stop,
 }
 
+impl Outcome {
+    /// Where there is no vertex, which takes no step.
+    const NOTHING: Outcome = Outcome {
+        iterations: 0,
+        updates: 0,
+        last_step: 0.0,
+        stop: Stop::Still,
+    };
+}
+
 /// One closed part of the surface.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct Component {
@@ -197,9 +208,8 @@ pub struct Stats {
     pub largest: Vec<Component>,
     /// Parts that keep less than a tenth of what marching cubes encloses.
     pub vanishing: u64,
-    /// Root mean square of the angle between chords of the curves in which the surface of marching cubes meets the planes of
-    /// voxel centres, in degrees.
-    /// Null where there is no curve.
+    /// Root mean square of the angle between chords of the curves in which the surface of marching
+    /// cubes meets the planes of voxel centres, in degrees; null where there is no curve.
     pub turning_before_deg: Option<f64>,
     /// The same of the smooth surface.
     pub turning_after_deg: Option<f64>,
@@ -241,6 +251,7 @@ pub fn smooth(
     let before = parts.enclosed(surface);
     progress.stage("smooth", u64::from(params.max_iterations));
     let (mut offsets, outcome) = match params.energy {
+        _ if surface.is_empty() => (Vec::new(), Outcome::NOTHING),
         Energy::Laplacian => {
             // Neighbours are those of the split that the paper's tables have.
             let fans = given.is_none().then(|| surface.fans());
@@ -259,7 +270,7 @@ pub fn smooth(
     progress.stage("split", 0);
     let triangles = match given {
         Some(triangles) => triangles.to_vec(),
-        None => surface.triangles(&placed(surface, metric, |v| offsets[v])),
+        None => surface.triangles(&surface.on_grid(metric, |v| offsets[v])),
     };
     let after = match params.energy {
         Energy::Laplacian => parts.enclosed_by(surface, &triangles, |v| offsets[v]),
@@ -278,23 +289,11 @@ pub fn smooth(
     Ok((offsets, triangles, stats))
 }
 
-/// Places in the smallest spacing.
-fn placed(surface: &Surface, metric: Vec3, offset: impl Fn(usize) -> Vec3 + Sync) -> Vec<Vec3> {
-    (0..surface.len())
-        .into_par_iter()
-        .with_min_len(1 << 12)
-        .map(|v| {
-            let (place, moved) = (surface.places[v], offset(v));
-            std::array::from_fn(|a| (0.5 * f64::from(place[a]) + moved[a]) * metric[a])
-        })
-        .collect()
-}
-
 /// Root mean square of the angle between one chord and the next of the curves in which a surface meets
 /// the planes of voxel centres, in degrees: what is left of the staircase, and what the shape itself turns.
 ///
-/// `metric` is the spacing over the smallest one, `offset` in voxels. 0 where there is no curve. The mean
-/// is taken of the squared distances between the directions, which needs no angle of each.
+/// `metric` is the spacing over the smallest one, `offset` in voxels; `None` where there is no curve. The
+/// mean is taken of the squared distances between the directions, which needs no angle of each.
 pub fn turning(
     surface: &Surface,
     metric: Vec3,
@@ -374,7 +373,7 @@ pub fn smooth_in_boxes(
         .zip(&mesh.positions)
         .map(way)
         .fold(0.0, f64::max);
-    stats.awake_share = 1.0;
+    stats.awake_share = if outcome.iterations > 0 { 1.0 } else { 0.0 };
     (stats.voxels, stats.volume_before, stats.volume_after) = (None, None, None);
     Ok((positions, stats))
 }
@@ -432,8 +431,8 @@ pub fn smooth_net(
     }
     let closed = border == Border::Closed;
     stats.voxels = closed.then(|| inside(volume, select).count() as i64);
-    stats.volume_before = closed.then(|| before.iter().sum());
-    stats.volume_after = closed.then(|| after.iter().sum());
+    let sum = |of: &[f64]| closed.then(|| of.iter().fold(0.0, |a, b| a + b));
+    (stats.volume_before, stats.volume_after) = (sum(&before), sum(&after));
     Ok((surface, (net.offsets, net.triangles, stats)))
 }
 
@@ -510,7 +509,8 @@ fn stats(
     let closed = parts.voxels[labels.min(parts.len())..]
         .iter()
         .all(Option::is_some);
-    let sum = |of: &[f64]| closed.then(|| of[labels.min(of.len())..].iter().sum());
+    let sum =
+        |of: &[f64]| closed.then(|| of[labels.min(of.len())..].iter().fold(0.0, |a, b| a + b));
     let way = |v: &Vec3| match params.constraint {
         Constraint::CellSize | Constraint::CellCenter => {
             v.iter().fold(0.0, |m: f64, c| m.max(c.abs()))

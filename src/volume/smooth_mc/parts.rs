@@ -226,16 +226,8 @@ impl Parts {
         metric: Vec3,
         offset: &(impl Fn(usize) -> Vec3 + Sync),
     ) -> Vec<Vec3> {
-        (0..surface.len())
-            .into_par_iter()
-            .with_min_len(CHUNK)
-            .map(|v| {
-                let (place, origin) = (surface.places[v], self.origins[self.of[v] as usize]);
-                let moved = offset(v);
-                let at = |a: usize| 0.5 * f64::from(place[a] - origin[a]) + moved[a];
-                std::array::from_fn(|a| at(a) * metric[a])
-            })
-            .collect()
+        let origin = |v: usize| self.origins[self.of[v] as usize];
+        surface.on_grid_from(origin, metric, offset)
     }
 
     fn sum(

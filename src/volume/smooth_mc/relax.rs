@@ -143,6 +143,9 @@ pub(super) fn in_boxes(
     advance: &(dyn Fn() + Sync),
 ) -> (Vec<Vec3>, Outcome) {
     let first = &mesh.positions;
+    if first.is_empty() {
+        return (Vec::new(), Outcome::NOTHING);
+    }
     let ends = ends_of(&mesh.triangles, first.len());
     let neighbours = Neighbours::new(
         first.len(),

@@ -79,7 +79,7 @@ mod tests {
             report.volume.expect("a volume")
         };
         let share = volume(&smooth) / volume(&positions);
-        let rms = normal_rms(&smooth, &triangles, 31.5);
+        let rms = normal_rms(&smooth, &triangles, |p| p.map(|c| c - 31.5));
         let far = positions
             .iter()
             .zip(&smooth)
