@@ -144,6 +144,12 @@ impl<'a> Graph<'a> {
         }
     }
 
+    /// Whether a point lies in the convex hull; found by a walk from a cell near it.
+    pub fn has_inside(&self, p: [f64; 3], near: u32) -> bool {
+        let cell = self.triangulation.locate(p, Some(near));
+        cell.is_some_and(|cell| self.cell(cell).is_finite())
+    }
+
     /// Whether a point is the dual vertex of a cell of this graph.
     pub fn is_centre(&self, cell: u32, p: [f64; 3]) -> bool {
         (cell as usize) < self.nodes.len() && self.centre(cell) == p

@@ -9,7 +9,7 @@
 //!
 //! What was decided where the paper is silent, or wrong:
 //! - its relaxation forgets the way so far, and its search stops at the hull without the last gate; see
-//!   [`search`];
+//!   [`search::widest`];
 //! - its rule for the weight of an edge in the plane, half the gap between two atoms, does not hold in space,
 //!   where nearly every facet has two atoms that overlap: a gate is as wide as the ball that touches
 //!   its three atoms, see [`graph`];

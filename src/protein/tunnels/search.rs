@@ -134,8 +134,10 @@ const NONE: u32 = u32::MAX;
 /// The widest way from a cell to the outside: Dijkstra's search, the smallest width on the way in place
 /// of the sum of lengths.
 ///
-/// The paper's pseudocode compares `max(d[v], w)`, which forgets the way so far; the width of a way is
-/// `min(d[u], w)`, and it is that which is made as large as can be. The last gate counts.
+/// The paper's pseudocode compares `max(d[v], w)`: what it calls the width of a way is then that of its
+/// last gate, and cells already settled get new predecessors, so that the way back runs in circles. (Left
+/// alone they would make Prim's tree, whose ways are the widest too.) Here the width of a way is
+/// `min(d[u], w)`, and the last gate counts.
 ///
 /// `O(m log n)` for `m` gates looked at.
 pub fn widest(

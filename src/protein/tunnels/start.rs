@@ -58,7 +58,9 @@ impl Start {
                     continue;
                 }
                 let width = graph.node(cell).width;
-                if best.is_none_or(|(w, a, _)| (width, -away) > (w, -a)) {
+                if best.is_none_or(|(w, a, _)| (width, -away) > (w, -a))
+                    && graph.has_inside(centre, cell)
+                {
                     best = Some((width, away, cell));
                 }
             }

@@ -55,6 +55,9 @@ pub struct Tunnel {
     pub lining: Vec<u32>,
 }
 
+/// A tunnel has about so many stops at most, whatever the step.
+const MOST_STOPS: f64 = 1e5;
+
 /// How far from the surface of a tunnel an atom still lines it.
 pub const LINING: f64 = 3.0;
 
@@ -123,7 +126,39 @@ pub fn centreline(graph: &mut Graph, route: &Route, outside: &Outside) -> Vec<[f
         }
     }
     points.dedup();
+    cut_at_hull(graph, &mut points);
     points
+}
+
+/// Ends a way where it first leaves the convex hull: from there it is free to go straight away from all
+/// atoms, while dual vertices of flat cells at the hull may lie anywhere.
+fn cut_at_hull(graph: &Graph, points: &mut Vec<[f64; 3]>) {
+    let mut near = None;
+    let mut is_inside = |p: [f64; 3]| {
+        near = graph.triangulation.locate(p, near);
+        near.is_some_and(|cell| graph.cell(cell).is_finite())
+    };
+    let Some(first) = points
+        .iter()
+        .position(|p| !is_inside(*p))
+        .filter(|first| *first > 0)
+    else {
+        return;
+    };
+    // Between the last corner inside and the first outside, to the last bit or so.
+    let (mut inner, mut outer) = (points[first - 1], points[first]);
+    for _ in 0..200 {
+        let middle = scale(add(inner, outer), 0.5);
+        if middle == inner || middle == outer {
+            break;
+        }
+        match is_inside(middle) {
+            true => inner = middle,
+            false => outer = middle,
+        }
+    }
+    points.truncate(first);
+    points.push(outer);
 }
 
 /// The narrowest place of a way with corners; of one point, that point.
@@ -162,6 +197,11 @@ fn stops(
             ball,
         })
     };
+    let whole: f64 = corners
+        .windows(2)
+        .map(|pair| length(sub(pair[1], pair[0])))
+        .sum();
+    let step = step.max(whole / MOST_STOPS);
     let mut stops = vec![stop(0.0, *corners.first()?)?];
     let mut start = 0.0;
     for pair in corners.windows(2) {
