@@ -125,11 +125,22 @@ impl Clearance {
 
     /// The distance to the nearest ball; infinite without any.
     pub fn at(&self, p: [f64; 3]) -> f64 {
-        let mut best = f64::INFINITY;
-        self.visit(p, f64::INFINITY, |near, _| {
-            best = best.min(near.distance);
-            best
-        });
+        self.between(p, f64::NEG_INFINITY, f64::INFINITY)
+    }
+
+    /// The distance to the nearest ball, where it is known to be at least `floor` and at most `best`:
+    /// the search ends with the first ball at the floor, of many that are equally near.
+    pub fn between(&self, p: [f64; 3], floor: f64, mut best: f64) -> f64 {
+        if best > floor {
+            self.visit(p, best, |near, _| {
+                best = best.min(near.distance);
+                if best > floor {
+                    best
+                } else {
+                    f64::NEG_INFINITY
+                }
+            });
+        }
         best
     }
 
@@ -221,7 +232,8 @@ impl Clearance {
                 }
                 continue;
             }
-            let [a, b] = [node.parts, node.parts + 1].map(|k| (self.nodes[k as usize].bound(p), k));
+            let a = (self.nodes[node.parts as usize].bound(p), node.parts);
+            let b = (self.nodes[node.parts as usize + 1].bound(p), node.parts + 1);
             let (near, far) = if a.0 <= b.0 { (a, b) } else { (b, a) };
             waiting[count] = far;
             waiting[count + 1] = near;
@@ -284,6 +296,13 @@ mod tests {
                 assert_eq!(
                     tree.at(p),
                     all.first().map_or(f64::INFINITY, |n| n.distance)
+                );
+                let [floor, best] = all
+                    .first()
+                    .map_or([0.0; 2], |n| [n.distance - 0.1, n.distance + 0.1]);
+                assert_eq!(
+                    tree.between(p, floor, best),
+                    all.first().map_or(best, |n| n.distance)
                 );
                 assert_eq!(tree.several(p, 4), all[..count.min(4)]);
                 let q = [rng.range(-2.0, 3.0), rng.unit(), rng.unit()];

@@ -5,7 +5,7 @@
 //! else at the end of the edge nearer to it (Medek, Benes and Sochor 2007, section 3). Widths are worked
 //! out when a search asks for them, and kept.
 
-use crate::numeric::vector::{cross, dot, sub};
+use crate::numeric::vector::{cross, dot, length, sub};
 use crate::protein::clearance::{Ball, Clearance};
 use crate::spatial::delaunay3::{
     Cell, Delaunay3, FACET, Sphere, orthosphere, orthosphere_of_facet, place,
@@ -35,6 +35,20 @@ pub struct Node {
     pub width: f64,
 }
 
+/// The narrowest point of a gate whose dual edge crosses its facet's plane.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Crossing {
+    /// The point.
+    pub point: [f64; 3],
+    /// The power of the crossing itself.
+    pub square: f64,
+    /// How far the point is from the crossing.
+    off: f64,
+}
+
+/// Relative error of dual vertices, with room.
+const ROUNDING: f64 = 1e-11;
+
 const UNKNOWN: Node = Node {
     centre: [f64::NAN; 3],
     width: f64::NAN,
@@ -52,6 +66,9 @@ pub struct Graph<'a> {
     /// By cell and slot; NaN while unknown.
     gates: Vec<[f64; 4]>,
     evaluated: u64,
+    /// The largest radius, and the weight that goes with it.
+    largest: f64,
+    heaviest: f64,
 }
 
 impl<'a> Graph<'a> {
@@ -63,7 +80,11 @@ impl<'a> Graph<'a> {
         clearance: &'a Clearance,
     ) -> Self {
         let cells = triangulation.cells().len();
+        let largest = balls.iter().map(|b| b.radius);
+        let heaviest = triangulation.points().iter().map(|p| p[3]);
         Graph {
+            largest: largest.fold(f64::NEG_INFINITY, f64::max),
+            heaviest: heaviest.fold(f64::NEG_INFINITY, f64::max),
             triangulation,
             metric,
             balls,
@@ -120,7 +141,9 @@ impl<'a> Graph<'a> {
             let Sphere { centre, square } = orthosphere(self.triangulation.corners(cell));
             let width = match self.metric {
                 Metric::Uniform(radius) => square.sqrt() - radius,
-                Metric::Touching | Metric::Along => self.clearance.at(centre),
+                Metric::Touching | Metric::Along => {
+                    self.clear(centre, 0.0, square, &self.cell(cell).vertices)
+                }
                 Metric::Power => square,
             };
             // A sphere too large for a double is as good as the outside.
@@ -176,20 +199,38 @@ impl<'a> Graph<'a> {
         width
     }
 
+    /// The clearance at a point that is `off` from the centre of a sphere, of this squared radius, to
+    /// which no atom is nearer than the vertices that it is orthogonal to.
+    ///
+    /// That bounds the clearance from both sides, and ends the search early where many atoms are as near.
+    fn clear(&self, p: [f64; 3], off: f64, square: f64, vertices: &[u32]) -> f64 {
+        let mut best = f64::INFINITY;
+        for vertex in vertices {
+            let ball = &self.balls[self.triangulation.input(*vertex) as usize];
+            best = best.min(ball.distance(p));
+        }
+        let reach = (square + self.heaviest).max(0.0).sqrt();
+        let floor = reach * (1.0 + ROUNDING) - self.largest - off;
+        self.clearance.between(p, floor, best)
+    }
+
     fn measure(&mut self, cell: u32, slot: usize) -> f64 {
-        let point = self.narrowest(cell, slot);
+        let crossing = self.narrowest(cell, slot);
         let ends = [cell, self.cell(cell).neighbours[slot]].map(|c| self.node(c));
         let widths = ends[0].width.min(ends[1].width);
-        let width = match (self.metric, point) {
-            (Metric::Uniform(radius), Some((_, square))) => square.sqrt() - radius,
-            (Metric::Power, Some((_, square))) => square,
-            (Metric::Touching, Some((y, _))) => self.clearance.at(y),
+        let width = match (self.metric, crossing) {
+            (Metric::Uniform(radius), Some(crossing)) => crossing.square.sqrt() - radius,
+            (Metric::Power, Some(crossing)) => crossing.square,
+            (Metric::Touching, Some(Crossing { point, square, off })) => {
+                let vertices = self.cell(cell).vertices;
+                self.clear(point, off, square, &FACET[slot].map(|k| vertices[k]))
+            }
             (Metric::Along, _) => {
                 let way = [ends[0].centre, ends[1].centre];
                 match way.iter().flatten().all(|v| v.is_finite()) {
                     true => self.clearance.along(way[0], way[1]).distance,
                     // A ray to the outside: as wide as where it starts, or as the facet.
-                    false => point.map_or(widths, |(y, _)| self.clearance.at(y)),
+                    false => crossing.map_or(widths, |c| self.clearance.at(c.point)),
                 }
             }
             (_, None) => widths,
@@ -198,8 +239,8 @@ impl<'a> Graph<'a> {
         width.min(widths)
     }
 
-    /// Where the dual edge crosses the plane of a facet, and the power there; none where it does not.
-    pub fn narrowest(&mut self, cell: u32, slot: usize) -> Option<([f64; 3], f64)> {
+    /// Where the dual edge crosses the plane of a facet; none where it does not.
+    pub fn narrowest(&mut self, cell: u32, slot: usize) -> Option<Crossing> {
         let (cell, slot) = self.finite_side(cell, slot)?;
         let Cell {
             vertices,
@@ -228,7 +269,11 @@ impl<'a> Graph<'a> {
             }
             _ => sphere.centre,
         };
-        Some((point, sphere.square))
+        Some(Crossing {
+            point,
+            square: sphere.square,
+            off: length(sub(point, sphere.centre)),
+        })
     }
 
     /// The facet as one of a finite cell.

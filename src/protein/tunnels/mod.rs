@@ -398,7 +398,7 @@ impl<'a> Search<'a> {
     }
 
     fn gate_point(&self, graph: &mut Graph, cell: u32, slot: usize) -> [f64; 3] {
-        let crossed = graph.narrowest(cell, slot).map(|(point, _)| point);
+        let crossed = graph.narrowest(cell, slot).map(|c| c.point);
         let ends = [cell, graph.cell(cell).neighbours[slot]].map(|c| graph.node(c));
         let narrower = if ends[0].width <= ends[1].width {
             ends[0]

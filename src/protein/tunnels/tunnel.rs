@@ -120,8 +120,8 @@ pub fn centreline(graph: &mut Graph, route: &Route, outside: &Outside) -> Vec<[f
             points.push(centre);
         }
         if let Some(slot) = route.slots.get(index) {
-            if let Some((point, _)) = graph.narrowest(*cell, *slot) {
-                points.push(point);
+            if let Some(crossing) = graph.narrowest(*cell, *slot) {
+                points.push(crossing.point);
             }
         }
     }
