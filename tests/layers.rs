@@ -31,6 +31,7 @@ const MAY_USE: &[(&str, &[&str])] = &[
             "trade", "volume",
         ],
     ),
+    ("protein", &["error", "numeric", "report", "spatial"]),
     (
         "measure",
         &[
@@ -40,7 +41,9 @@ const MAY_USE: &[(&str, &[&str])] = &[
     // Data types only: a reader calls no algorithm.
     (
         "io",
-        &["error", "image", "mesh", "numeric", "report", "volume"],
+        &[
+            "error", "image", "mesh", "numeric", "protein", "report", "volume",
+        ],
     ),
 ];
 

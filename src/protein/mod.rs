@@ -1,0 +1,29 @@
+//! Molecules: atoms with radii, which of them count, and where a search in them begins.
+//!
+//! Lengths are in the file's unit, which for every molecular format is the angstrom. Indices of
+//! atoms, residues and models count from 0 in the order of the file.
+
+mod altlocs;
+pub mod builder;
+pub mod element;
+pub mod inventory;
+pub mod molecule;
+pub mod name;
+pub mod polymer;
+pub mod radii;
+pub mod select;
+mod spacing;
+pub mod start;
+
+pub use element::Element;
+pub use molecule::{Atom, Model, Molecule, Residue};
+pub use name::Name;
+
+/// An atom as the algorithms see it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Sphere {
+    /// Its centre.
+    pub center: [f64; 3],
+    /// Its radius; 0 is a point.
+    pub radius: f64,
+}
