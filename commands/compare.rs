@@ -5,7 +5,7 @@ use crate::exit::Exit;
 use crate::job::{Found, Job};
 use crate::shared::{Common, InputFormat, Seed, not_negative};
 use crate::words;
-use scantle::error::{Result, number};
+use scantle::error::{Error, Fault, Result, number};
 use scantle::image::samples::Image;
 use scantle::io::Content;
 use scantle::io::format::Format;
@@ -110,9 +110,18 @@ pub fn run(args: &Args) -> Result<Exit> {
             Content::Volume(a) => volumes(job, &a, args),
             Content::Image(a) => images(job, &a, args),
             Content::Report(a) => reports(job, &a, args),
+            Content::Molecule(_) => Err(no_measure(job)),
         };
         Ok(found?.check("tolerance", args.tolerance))
     })
+}
+
+/// The error of a kind that there is no measure for.
+fn no_measure(job: &Job) -> Error {
+    let format = job.input().map_or("", |input| input.format.as_str());
+    let problem = format!("holds a molecule ({format}), which has no measure here");
+    let hint = "two meshes, volumes, images or reports can be compared";
+    Error::Geometry(Fault::whole(problem).with_hint(hint))
 }
 
 impl Args {

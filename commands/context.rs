@@ -96,7 +96,7 @@ impl<'a> Files<'a> {
         let planned = destination::plan(
             "output",
             word,
-            asked.map(Format::name),
+            asked.map(|format| format.extensions()[0]),
             &self.names(),
             self.labelled,
         )?;

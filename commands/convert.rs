@@ -11,10 +11,10 @@ use scantle::io::format::{Format, Kind};
 use schemars::JsonSchema;
 use serde::Serialize;
 
-/// Write a mesh, a volume or an image in another format
+/// Write a mesh, a volume, an image or a molecule in another format
 ///
-/// Vertices, faces, voxels, pixels and their order stay as they are. What the output format cannot hold is
-/// left out, and a warning counts it.
+/// Vertices, faces, voxels, pixels, atoms and their order stay as they are. What the output format cannot
+/// hold is left out, and a warning counts it.
 #[derive(Debug, clap::Args)]
 #[command(after_long_help = EXAMPLES)]
 pub struct Args {
@@ -42,7 +42,7 @@ pub struct Params {
 /// What was done.
 #[derive(Debug, Serialize, JsonSchema)]
 pub struct Stats {
-    /// What was converted: `mesh`, `volume` or `image`.
+    /// What was converted: `mesh`, `volume`, `image` or `molecule`.
     kind: &'static str,
 }
 
@@ -66,6 +66,7 @@ fn convert(job: &mut Job) -> Result<Found<Params, Stats>> {
         io::Content::Mesh(mesh) => job.write_mesh(mesh)?,
         io::Content::Volume(volume) => job.write_volume(volume)?,
         io::Content::Image(image) => job.write_image(image)?,
+        io::Content::Molecule(molecule) => job.write_molecule(molecule)?,
         io::Content::Report(_) => {
             let fault = Fault::whole("holds a report (json), which is written in no other format");
             let hint = "scantle info and scantle compare take reports";

@@ -8,6 +8,7 @@ use crate::words;
 use scantle::error::Result;
 use scantle::io::Content;
 use scantle::mesh::topology::{Topology, topology};
+use scantle::protein::inventory::{Inventory, inventory};
 use scantle::report::{Made, made_by};
 use scantle::volume::Volume;
 use schemars::JsonSchema;
@@ -16,8 +17,9 @@ use serde::Serialize;
 /// Tell what is in a file, and what looks wrong with it
 ///
 /// Counts, bounds and, of a mesh, its topology: whether it is closed, oriented and manifold. Of a
-/// volume, where it is, what is set and the range of values; of an image, its size and samples. Of
-/// JSON, the documents, and which commands they are reports of.
+/// volume, where it is, what is set and the range of values; of an image, its size and samples; of a
+/// molecule, its chains, residues and elements. Of JSON, the documents, and which commands they are
+/// reports of.
 #[derive(Debug, clap::Args)]
 #[command(after_long_help = EXAMPLES)]
 pub struct Args {
@@ -33,7 +35,7 @@ Examples:
   scantle info fixtures/shapes/*.obj --report shapes.jsonl
 ";
 
-/// Commands and versions that are named to a person.
+/// Commands, versions and kinds of residues that are named to a person.
 const NAMED: usize = 4;
 
 /// This command has no parameters.
@@ -50,6 +52,8 @@ pub enum Stats {
     Volume(VolumeStats),
     /// Pixels.
     Image(ImageStats),
+    /// Atoms.
+    Molecule(Box<Inventory>),
     /// JSON documents.
     Report(ReportStats),
 }
@@ -130,6 +134,13 @@ fn look(job: &mut Job) -> Result<Found<Params, Stats>> {
             channels: image.channels as u64,
             bits: image.bits(),
         }),
+        Content::Molecule(molecule) => {
+            job.progress().stage("count", 0);
+            let inventory = inventory(&molecule);
+            job.warn(inventory.warnings());
+            summary += &chains_in_words(&inventory);
+            Stats::Molecule(Box::new(inventory))
+        }
         Content::Report(documents) => {
             let reports = made_by(&documents);
             summary += &made_in_words(&reports);
@@ -152,6 +163,22 @@ fn made_in_words(reports: &[Made]) -> String {
     }
     if reports.len() > NAMED {
         text += &format!(", and reports of {} more kinds", reports.len() - NAMED);
+    }
+    text
+}
+
+/// `, 2 chains, 396 of water, 1 HEM`, for the first few.
+fn chains_in_words(inventory: &Inventory) -> String {
+    let chains = words::counted(inventory.chains.len() as u64, "chain", "chains");
+    let mut text = format!(", {chains}");
+    if inventory.waters > 0 {
+        text += &format!(", {} of water", inventory.waters);
+    }
+    for row in inventory.hetero.iter().take(NAMED) {
+        text += &format!(", {} {}", row.residues, words::shown(&row.name));
+    }
+    if inventory.hetero.len() > NAMED {
+        text += &format!(", and {} more kinds", inventory.hetero.len() - NAMED);
     }
     text
 }

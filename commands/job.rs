@@ -15,6 +15,7 @@ use scantle::io::source::Source;
 use scantle::io::{self, Content};
 use scantle::mesh::Mesh;
 use scantle::progress::Progress;
+use scantle::protein::Molecule;
 use scantle::report::{
     Accuracy, Input, Measures, Modelled, Output, Report, Run, SCHEMA, Stage, Warning,
 };
@@ -279,6 +280,11 @@ impl<'a> Job<'a> {
     /// Writes the result, if the user wants it.
     pub fn write_image(&mut self, image: &Image) -> Result<()> {
         self.write_with(|sink, format| Ok((io::write_image(image, sink, format)?, Vec::new())))
+    }
+
+    /// Writes the result, if the user wants it.
+    pub fn write_molecule(&mut self, molecule: &Molecule) -> Result<()> {
+        self.write_with(|sink, format| io::write_molecule(molecule, sink, format))
     }
 
     fn write_with(

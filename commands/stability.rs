@@ -200,7 +200,8 @@ impl<'a> Bench<'a> {
     }
 
     fn path(&self, name: &str, format: Format) -> PathBuf {
-        self.folder.path().join(format!("{name}.{}", format.name()))
+        let extension = format.extensions()[0];
+        self.folder.path().join(format!("{name}.{extension}"))
     }
 
     /// The options that stand in the input's space, moved; with `undo`, moved and taken back, which

@@ -24,6 +24,9 @@ pub fn content(content: &Content) -> String {
         (content.triangles, "triangle", "triangles"),
         (content.segments, "segment", "segments"),
         (content.points, "point", "points"),
+        (content.atoms, "atom", "atoms"),
+        (content.residues, "residue", "residues"),
+        (content.models, "model", "models"),
         (content.documents, "document", "documents"),
     ];
     for (count, one, many) in counts {

@@ -13,7 +13,7 @@
 //! | 2 | [`spatial`] [`image`] |
 //! | 3 | [`mesh`] [`camera`] |
 //! | 4 | [`volume`] |
-//! | 5 | [`render`] |
+//! | 5 | [`render`] [`protein`] |
 //! | 6 | [`measure`] [`io`] (used by commands alone) |
 #![deny(clippy::print_stdout, clippy::print_stderr)]
 

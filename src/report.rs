@@ -100,6 +100,15 @@ pub struct Content {
     /// Bits of a sample of an image.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub bits: Option<u32>,
+    /// Atoms of a molecule, of all its models.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub atoms: Option<u64>,
+    /// Residues of a molecule, of all its models; ligands, ions and water are some too.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub residues: Option<u64>,
+    /// Models of a molecule, where there are several.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub models: Option<u64>,
     /// Documents of a JSON file.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub documents: Option<u64>,

@@ -32,6 +32,12 @@ const MAY_USE: &[(&str, &[&str])] = &[
         ],
     ),
     (
+        "protein",
+        &[
+            "error", "mesh", "numeric", "progress", "report", "spatial", "trade", "volume",
+        ],
+    ),
+    (
         "measure",
         &[
             "error", "image", "mesh", "numeric", "progress", "report", "spatial", "trade", "volume",
@@ -40,7 +46,9 @@ const MAY_USE: &[(&str, &[&str])] = &[
     // Data types only: a reader calls no algorithm.
     (
         "io",
-        &["error", "image", "mesh", "numeric", "report", "volume"],
+        &[
+            "error", "image", "mesh", "numeric", "protein", "report", "volume",
+        ],
     ),
 ];
 

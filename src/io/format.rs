@@ -11,6 +11,8 @@ pub enum Kind {
     Volume,
     /// Pixels.
     Image,
+    /// Atoms.
+    Molecule,
     /// What commands report, or any other JSON documents.
     Report,
 }
@@ -22,6 +24,7 @@ impl Kind {
             Kind::Mesh => "mesh",
             Kind::Volume => "volume",
             Kind::Image => "image",
+            Kind::Molecule => "molecule",
             Kind::Report => "report",
         }
     }
@@ -32,6 +35,7 @@ impl Kind {
             Kind::Mesh => "a mesh",
             Kind::Volume => "a volume",
             Kind::Image => "an image",
+            Kind::Molecule => "a molecule",
             Kind::Report => "a report",
         }
     }
@@ -72,6 +76,16 @@ pub enum Format {
     Svo,
     /// Portable Network Graphics.
     Png,
+    /// Protein Data Bank, of fixed columns.
+    Pdb,
+    /// Macromolecular Crystallographic Information File.
+    Cif,
+    /// PDB with charges and radii, of words.
+    Pqr,
+    /// Centres and radii, of words.
+    Xyzr,
+    /// Centres and radii, of words parted by commas.
+    SpheresCsv,
     /// JSON and JSON Lines.
     Json,
 }
@@ -229,6 +243,44 @@ const TABLE: &[Row] = &[
         (true, true),
         "PNG: grey, colour and palette of up to 16 bits, with or without opacity",
     ),
+    row(
+        Format::Pdb,
+        &["pdb", "ent", "pdb1"],
+        Kind::Molecule,
+        (true, true),
+        "Protein Data Bank: atoms in fixed columns, and in hybrid-36 where numbers are large",
+    ),
+    row(
+        Format::Cif,
+        &["cif", "mmcif"],
+        Kind::Molecule,
+        (true, true),
+        "PDBx/mmCIF: the atoms of its first data block that has any",
+    ),
+    row(
+        Format::Pqr,
+        &["pqr"],
+        Kind::Molecule,
+        (true, false),
+        "PQR: atoms with charge and radius, parted by blanks; charges are not read",
+    ),
+    row(
+        Format::Xyzr,
+        &["xyzr"],
+        Kind::Molecule,
+        (true, true),
+        "XYZR: centre and radius of a sphere on each line",
+    ),
+    Row {
+        name: "spheres-csv",
+        ..row(
+            Format::SpheresCsv,
+            &["csv"],
+            Kind::Molecule,
+            (true, true),
+            "columns x, y, z, r, with a line of names or without",
+        )
+    },
     row(
         Format::Json,
         &["json", "jsonl"],

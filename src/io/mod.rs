@@ -8,8 +8,10 @@
 mod base64;
 pub mod binvox;
 pub mod format;
+mod gather;
 pub mod gltf;
 mod header;
+mod hybrid36;
 pub mod json;
 pub mod metaimage;
 pub mod nifti;
@@ -17,6 +19,7 @@ pub mod npy;
 pub mod nrrd;
 pub mod obj;
 pub mod off;
+pub mod pdb;
 #[cfg(test)]
 mod peers;
 pub mod ply;
@@ -40,6 +43,7 @@ mod written_volume;
 use crate::error::{Error, Fault, Result};
 use crate::image::samples::Image;
 use crate::mesh::{Mesh, Polygons};
+use crate::protein::Molecule;
 use crate::report::{self, Input, Output, Warning};
 use crate::volume::Volume;
 use crate::volume::bits::BitGrid;
@@ -60,6 +64,8 @@ pub enum Content {
     Volume(Volume),
     /// Pixels.
     Image(Image),
+    /// Atoms.
+    Molecule(Molecule),
     /// JSON documents, in the order of the file.
     Report(Vec<Value>),
 }
@@ -71,6 +77,7 @@ impl Content {
             Content::Mesh(_) => Kind::Mesh,
             Content::Volume(_) => Kind::Volume,
             Content::Image(_) => Kind::Image,
+            Content::Molecule(_) => Kind::Molecule,
             Content::Report(_) => Kind::Report,
         }
     }
@@ -98,6 +105,7 @@ pub fn read(source: &Source, format: Option<Format>) -> Result<(Content, Input, 
         Content::Mesh(mesh) => mesh.content(),
         Content::Volume(volume) => volume.content(),
         Content::Image(image) => image.content(),
+        Content::Molecule(molecule) => molecule.content(),
         Content::Report(documents) => report::Content {
             documents: Some(documents.len() as u64),
             ..report::Content::default()
@@ -128,6 +136,10 @@ fn parse(source: &Source, format: Format, warnings: &mut Vec<Warning>) -> Result
         Format::Svo => Content::Volume(svo::read(source, warnings)?),
         Format::Vti => Content::Volume(vti::read(source, warnings)?),
         Format::Png => Content::Image(png::read(source)?),
+        Format::Pdb => Content::Molecule(pdb::read(source, warnings)?),
+        Format::Cif | Format::Pqr | Format::Xyzr | Format::SpheresCsv => {
+            return Err(Fault::whole("is not read yet").into());
+        }
         Format::Json => Content::Report(json::read(source, warnings)?),
         Format::Vdb => return Err(Fault::whole("vdb files are written, not read").into()),
     };
@@ -135,6 +147,7 @@ fn parse(source: &Source, format: Format, warnings: &mut Vec<Warning>) -> Result
         Content::Mesh(mesh) => mesh.check()?,
         Content::Volume(volume) => volume.check()?,
         Content::Image(image) => image.check()?,
+        Content::Molecule(molecule) => molecule.check()?,
         Content::Report(_) => {}
     }
     Ok(content)
@@ -190,6 +203,17 @@ pub fn read_image(source: &Source, format: Option<Format>) -> Result<(Image, Inp
     }
 }
 
+/// Reads a molecule; a file of another kind is an error.
+pub fn read_molecule(
+    source: &Source,
+    format: Option<Format>,
+) -> Result<(Molecule, Input, Vec<Warning>)> {
+    match read(source, format)? {
+        (Content::Molecule(molecule), input, warnings) => Ok((molecule, input, warnings)),
+        (other, input, _) => Err(wrong_kind(source, &input.format, &other, Kind::Molecule)),
+    }
+}
+
 /// Reads JSON documents; a file of another kind is an error.
 pub fn read_report(
     source: &Source,
@@ -227,6 +251,26 @@ pub fn write_image(image: &Image, sink: &Sink, format: Format) -> Result<Vec<Out
         Format::Png => Ok(vec![sink.write(format, |out| png::write(image, out))?]),
         _ => Err(cannot_hold(format, Kind::Image)),
     }
+}
+
+/// Writes a molecule. Returns the lines for the report and warnings about what the format cannot hold.
+///
+/// Formats of spheres alone take the first model, with the radii of the elements where atoms have none
+/// of their own.
+pub fn write_molecule(
+    molecule: &Molecule,
+    sink: &Sink,
+    format: Format,
+) -> Result<(Vec<Output>, Vec<Warning>)> {
+    let writer: fn(&Molecule, &mut dyn Write) -> std::io::Result<()> = match format {
+        Format::Pdb => pdb::write,
+        _ => return Err(cannot_hold(format, Kind::Molecule)),
+    };
+    if let Some(problem) = pdb::refusal(molecule).filter(|_| format == Format::Pdb) {
+        return Err(Error::parameter("output-format", format.name(), problem));
+    }
+    let output = sink.write(format, |out| writer(molecule, out))?;
+    Ok((vec![output], Vec::new()))
 }
 
 /// Writes a volume. MHD writes two files: the header and, beside it, the data.
