@@ -260,7 +260,7 @@ pub fn run(args: &Args) -> Result<Exit> {
 }
 
 /// One model's atoms that count, and what was found between them.
-struct Model {
+pub(crate) struct Model {
     number: i32,
     selected: Selected,
     found: scantle::protein::tunnels::Tunnels,
