@@ -208,6 +208,7 @@ impl Args {
             tolerance: self.tolerance,
             step: self.step,
             memory,
+            ..Params::DEFAULT
         }
     }
 
