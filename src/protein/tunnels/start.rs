@@ -40,7 +40,7 @@ impl Start {
 
     /// The dual vertex of largest clearance within the search radius, of those not outside; the given
     /// point itself for a radius of 0.
-    pub fn find(
+    pub(super) fn find(
         graph: &mut Graph,
         given: [f64; 3],
         params: &Params,
