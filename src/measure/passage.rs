@@ -345,14 +345,14 @@ mod tests {
     fn it_confirms_the_exact_method_on_random_balls() {
         let radii = [1.2, 1.52, 1.55, 1.7, 1.8];
         let mut narrow = 0;
-        for seed in 0..30 {
+        for seed in 0..12 {
             let mut rng = Rng::new(seed, 1);
             let mut balls: Vec<Ball> = Vec::new();
             while balls.len() < 70 {
                 let centre = [0, 1, 2].map(|_| rng.range(-6.5, 6.5));
                 let made = Ball {
                     centre,
-                    radius: radii[rng.below(if seed < 20 { 5 } else { 1 })],
+                    radius: radii[rng.below(if seed < 8 { 5 } else { 1 })],
                 };
                 let is_free = made.distance([0.0; 3]) > 1.5 && length(centre) < 6.5;
                 if is_free && balls.iter().all(|b| length(sub(b.centre, centre)) > 1.6) {
@@ -369,16 +369,16 @@ mod tests {
             };
             let exact = find(&balls, [0.0; 3], &params, &Silent).expect("a start inside");
             let exact = exact.widest.expect("a way");
-            let found = known(&balls, [0.0; 3], 5e-3);
+            let found = known(&balls, [0.0; 3], 0.02);
             assert!(
                 found.lower <= exact.upper && exact.lower <= found.upper,
                 "{seed}: {found:?} {exact:?}"
             );
-            assert!(found.upper - found.lower <= 5e-3, "{seed}");
+            assert!(found.upper - found.lower <= 0.02, "{seed}");
             narrow += usize::from(exact.lower < 1.5);
         }
         assert!(
-            narrow > 15,
+            narrow > 6,
             "{narrow}: most should have a gate narrower than the start"
         );
     }

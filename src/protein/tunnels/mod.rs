@@ -19,11 +19,13 @@
 //! same with the smallest is an upper bound, and differs by the difference of the radii alone.
 
 mod balls;
+pub mod cluster;
 mod crop;
 mod exact;
 pub mod graph;
 mod grid;
 mod params;
+pub mod pores;
 pub mod search;
 mod sparse;
 mod start;

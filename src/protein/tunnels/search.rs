@@ -94,6 +94,11 @@ impl<'a> Outside<'a> {
         self.crop.is_none()
     }
 
+    /// The cells that are known to be outside, in order.
+    pub fn all(&self) -> impl Iterator<Item = u32> {
+        self.places.find(is_outside)
+    }
+
     /// How many cells are known to be outside.
     pub fn count(&self) -> usize {
         self.places.find(is_outside).count()
@@ -172,7 +177,7 @@ pub struct Found {
 
 /// Widest first, then lowest.
 #[derive(Debug, Clone, Copy, PartialEq)]
-struct Wide(f64, u32);
+pub(super) struct Wide(pub f64, pub u32);
 
 impl Eq for Wide {}
 impl Ord for Wide {
