@@ -19,11 +19,14 @@
 //! same with the smallest is an upper bound, and differs by the difference of the radii alone.
 
 mod balls;
+pub mod cut;
 mod exact;
 pub mod graph;
 mod grid;
 mod params;
 pub mod search;
+pub mod shape;
+mod solid;
 mod start;
 pub mod tunnel;
 
