@@ -1,5 +1,6 @@
 //! `scantle stability`: how far results drift at the extremes.
 
+mod input;
 mod result;
 
 use crate::exit::Exit;
@@ -11,19 +12,21 @@ use crate::shared::{Seed, Wrapping, not_negative, positive};
 use crate::streams::{complain, say, show};
 use crate::wrapped::Wrapped;
 use result::{Asked, Outcome, Row, Stats};
-use scantle::error::Result;
+use scantle::error::{Error, Result};
 use scantle::io::format::{Format, Kind};
 use scantle::io::sink::Sink;
 use scantle::io::source::Source;
 use scantle::io::{self, Content};
 use scantle::measure::stability::{
-    Changed, Drift, Motion, Step, image_drift, mesh_drift, steps, volume_drift,
+    Changed, Drift, Motion, Step, Subject, image_drift, mesh_drift, sphere_drift, steps,
+    volume_drift,
 };
 use scantle::measure::tradeoff::Failed;
-use scantle::mesh::Mesh;
 use scantle::progress::Progress;
-use scantle::trade::Placed;
-use std::path::PathBuf;
+use scantle::trade::{Placed, Tied};
+use std::fs;
+use std::io::ErrorKind;
+use std::path::{Path, PathBuf};
 use tempfile::TempDir;
 
 /// Measure how far a command's result drifts when its input is taken to the extremes
@@ -32,6 +35,10 @@ use tempfile::TempDir;
 /// elements, adds triangles without area, and shakes the last bit of every coordinate; runs the
 /// command on each, undoes the change on the result, and measures how far that is from the result
 /// of the untouched input.
+///
+/// Of a molecule the atoms that count by default are taken, of the first model, and run as spheres
+/// (xyzr) with the radii of the file, else of the elements; nothing else of it is left. Its atoms are
+/// reordered and doubled; it has no faces to change.
 ///
 /// Where a change has to round coordinates, the result is compared with that of the input so
 /// rounded, and what the rounding of the input itself does is a figure of its own. Changes under
@@ -86,6 +93,7 @@ picture is turned only where its --light and --camera are given, and turn along.
 Examples:
   scantle stability voxelize fixtures/shapes/torus-knot.ply --resolution 24 --max-error 0
   scantle stability voxelize fixtures/shapes/sphere.stl --resolution 16 --offsets 1,1e12
+  scantle stability tunnels fixtures/molecules/porthole.xyzr --start 0,0,0 --shell-radius 3
 ";
 
 /// The report of this command.
@@ -101,17 +109,18 @@ pub fn run(args: &Args) -> Result<Exit> {
         let why = format!("{} inputs, where one is taken", wrapped.inputs.len());
         return Ok(runs::refuse("stability", &why));
     };
+    if let Some(why) = tied(&wrapped) {
+        return Ok(runs::refuse("stability", &why));
+    }
     let places = Places::new(&args.wrapping, &wrapped.inputs)?;
     let format = wrapped.value("input-format");
     let format = format.as_deref().and_then(Format::from_name);
-    let read = Source::open(name, machine::default_memory())
-        .and_then(|source| io::read_mesh(&source, format));
-    let (mesh, input, _) = match read {
+    let (subject, input) = match input::read(name, format) {
         Ok(read) => read,
         Err(error) => return Ok(complain(&error, Some(name))),
     };
-    let bench = Bench::new(args, &wrapped, &mesh)?;
-    let untouched = match bench.run(&mesh, &Motion::NONE, "untouched") {
+    let bench = Bench::new(args, &wrapped, &subject)?;
+    let untouched = match bench.run(&subject, &Motion::NONE, "untouched") {
         Ok(untouched) => untouched,
         Err(failed) => {
             say(format_args!(
@@ -132,9 +141,9 @@ pub fn run(args: &Args) -> Result<Exit> {
         recorder.advance(1);
     }
     recorder.finish();
-    let in_space = !matches!(untouched.content, Content::Image(_));
+    let in_space = !matches!(untouched.content, Some(Content::Image(_)));
     let unit = wrapped.trade.error.unit;
-    let stats = Stats::new(&mesh, untouched.bound, unit, in_space, rows);
+    let stats = Stats::new(subject.extent(), untouched.bound, unit, in_space, rows);
     let table = result::table(&stats);
     if !talk.quiet {
         show(&table.aligned());
@@ -145,6 +154,15 @@ pub fn run(args: &Args) -> Result<Exit> {
     let asked = Asked::new(&wrapped, args);
     places.deliver("stability", asked, stats, vec![input], output, Vec::new())?;
     Ok(exit.max(unwritten))
+}
+
+/// Why the command cannot be run on changed copies with the options that it was given, if it cannot.
+fn tied(wrapped: &Wrapped) -> Option<String> {
+    let mut all = wrapped.trade.tied.iter();
+    let Tied { option, instead } = all.find(|tied| wrapped.is_set(tied.option))?;
+    Some(format!(
+        "--{option} depends on what changed copies of the input do not hold; {instead}"
+    ))
 }
 
 /// The check, where it was asked for.
@@ -166,14 +184,15 @@ fn judge(stats: &Stats, most: Option<f64>) -> Exit {
 
 /// A result, read back.
 struct Made {
-    content: Content,
+    /// None where there was nothing to write.
+    content: Option<Content>,
     bound: Option<f64>,
 }
 
 /// Where changed inputs are run.
 struct Bench<'a> {
     wrapped: &'a Wrapped,
-    mesh: &'a Mesh,
+    subject: &'a Subject,
     seed: u64,
     runs: Runs,
     format: Format,
@@ -181,14 +200,14 @@ struct Bench<'a> {
 }
 
 impl<'a> Bench<'a> {
-    fn new(args: &Args, wrapped: &'a Wrapped, mesh: &'a Mesh) -> Result<Self> {
-        let folder = tempfile::tempdir().map_err(|source| scantle::error::Error::Write {
+    fn new(args: &Args, wrapped: &'a Wrapped, subject: &'a Subject) -> Result<Self> {
+        let folder = tempfile::tempdir().map_err(|source| Error::Write {
             path: std::env::temp_dir(),
             source,
         })?;
         Ok(Bench {
             wrapped,
-            mesh,
+            subject,
             seed: args.seed.seed,
             runs: Runs {
                 in_process: args.wrapping.in_process,
@@ -244,34 +263,30 @@ impl<'a> Bench<'a> {
         (!free.is_empty()).then(|| format!("shows another side without {needed}"))
     }
 
-    /// Runs the command on a mesh, with its places moved.
-    fn run(&self, mesh: &Mesh, motion: &Motion, name: &str) -> Result<Made, Failed> {
+    /// Runs the command on a changed input, with its places moved.
+    fn run(&self, subject: &Subject, motion: &Motion, name: &str) -> Result<Made, Failed> {
         let options = self.options(motion, false).map_err(unfit)?;
-        self.run_with(mesh, &options, name)
+        self.run_with(subject, &options, name)
     }
 
     fn run_with(
         &self,
-        mesh: &Mesh,
+        subject: &Subject,
         options: &[(String, Option<String>)],
         name: &str,
     ) -> Result<Made, Failed> {
-        let broken = |error: scantle::error::Error| Failed {
-            code: Exit::of(&error) as u8,
-            message: error.to_string(),
-        };
+        let format = input::format_of(subject);
         let (from, to) = (
-            self.path(name, Format::Ply),
+            self.path(name, format),
             self.path(&format!("{name}-made"), self.format),
         );
-        io::write_mesh(mesh, &Sink::File(from.clone()), Format::Ply).map_err(broken)?;
+        input::write(subject, &Sink::File(from.clone())).map_err(broken)?;
+        forget(&to).map_err(broken)?;
         let (input, output) = (from.display().to_string(), to.display().to_string());
         let mut options = options.to_vec();
         if self.wrapped.is_set("input-format") {
-            options.push((
-                "input-format".to_owned(),
-                Some(Format::Ply.name().to_owned()),
-            ));
+            let format = format.name().to_owned();
+            options.push(("input-format".to_owned(), Some(format)));
         }
         let words = self.wrapped.words(std::slice::from_ref(&input), &options);
         let documents = self.runs.run(&words, &["--output", &output]);
@@ -279,8 +294,7 @@ impl<'a> Bench<'a> {
             message: failed.message.replace(&input, &self.wrapped.inputs[0]),
             ..failed
         })?;
-        let source = Source::open(&output, machine::default_memory()).map_err(broken)?;
-        let (content, ..) = io::read(&source, Some(self.format)).map_err(broken)?;
+        let content = read_back(&to, self.format).map_err(broken)?;
         let error = documents.first().and_then(|d| d.error(self.wrapped.trade));
         Ok(Made {
             content,
@@ -295,7 +309,7 @@ impl<'a> Bench<'a> {
             .trade
             .is_invariant(step.change(), |option| wrapped.value(option));
         let mut row = Row::new(step, promised);
-        let changed = match step.apply(self.mesh, self.seed) {
+        let changed = match step.apply(self.subject, self.seed) {
             Ok(changed) => changed,
             Err(why) => return row.skipped(why),
         };
@@ -316,14 +330,14 @@ impl<'a> Bench<'a> {
         untouched: &Made,
     ) -> Result<(Drift, Option<Drift>), Failed> {
         let motion = &changed.motion;
-        let made = self.run(&changed.mesh, motion, "changed")?;
+        let made = self.run(&changed.subject, motion, "changed")?;
         let given = self.options(&Motion::NONE, false).map_err(unfit)?;
         let options = self.options(motion, true).map_err(unfit)?;
         if changed.rounded.is_none() && given == options || motion.turn != Motion::NONE.turn {
             return Ok((drift(untouched, &made, motion)?, None));
         }
-        let mesh = changed.rounded.as_ref().unwrap_or(self.mesh);
-        let reference = self.run_with(mesh, &options, "rounded")?;
+        let subject = changed.rounded.as_ref().unwrap_or(self.subject);
+        let reference = self.run_with(subject, &options, "rounded")?;
         let by_input = drift(untouched, &reference, &Motion::NONE)?;
         Ok((drift(&reference, &made, motion)?, Some(by_input)))
     }
@@ -336,17 +350,47 @@ fn unfit(message: String) -> Failed {
     }
 }
 
+fn broken(error: Error) -> Failed {
+    Failed {
+        code: Exit::of(&error) as u8,
+        message: error.to_string(),
+    }
+}
+
+/// Removes the result of a run before, which a run that makes nothing would leave there.
+fn forget(path: &Path) -> Result<()> {
+    match fs::remove_file(path) {
+        Err(source) if source.kind() != ErrorKind::NotFound => Err(Error::Write {
+            path: path.to_owned(),
+            source,
+        }),
+        _ => Ok(()),
+    }
+}
+
+/// A result; none where a command that found nothing wrote no file, or not a byte.
+fn read_back(path: &Path, format: Format) -> Result<Option<Content>> {
+    if fs::metadata(path).map_or(true, |file| file.len() == 0) {
+        return Ok(None);
+    }
+    let source = Source::open(&path.display().to_string(), machine::default_memory())?;
+    let (content, ..) = io::read(&source, Some(format))?;
+    Ok(Some(content))
+}
+
 fn drift(reference: &Made, made: &Made, motion: &Motion) -> Result<Drift, Failed> {
-    match (&reference.content, &made.content) {
+    let (a, b) = match (&reference.content, &made.content) {
+        (Some(a), Some(b)) => (a, b),
+        (None, None) => return Ok(Drift::NONE),
+        _ => return Ok(Drift::ALL),
+    };
+    match (a, b) {
         (Content::Volume(a), Content::Volume(b)) => Ok(volume_drift(a, b, motion)),
-        (Content::Mesh(a), Content::Mesh(b)) => mesh_drift(a, b, motion).map_err(|error| Failed {
-            code: Exit::of(&error) as u8,
-            message: error.to_string(),
-        }),
-        (Content::Image(a), Content::Image(b)) => image_drift(a, b).map_err(|error| Failed {
-            code: Exit::of(&error) as u8,
-            message: error.to_string(),
-        }),
+        (Content::Mesh(a), Content::Mesh(b)) => mesh_drift(a, b, motion).map_err(broken),
+        (Content::Image(a), Content::Image(b)) => image_drift(a, b).map_err(broken),
+        (Content::Molecule(a), Content::Molecule(b)) => {
+            Ok(sphere_drift(&a.spheres(), &b.spheres(), motion))
+        }
         _ => Err(unfit(
             "the results are not of one kind that drift is measured for".to_owned(),
         )),

@@ -177,6 +177,9 @@ mod tests {
             for row in trade.invariant {
                 assert!(row.only.iter().all(|(option, _)| has(option)), "{name}");
             }
+            for tied in trade.tied {
+                assert!(has(tied.option) && !tied.instead.is_empty(), "{name}");
+            }
         }
     }
 }

@@ -19,8 +19,8 @@ pub struct Wrapped {
     matches: ArgMatches,
 }
 
-/// Options that the wrapping command sets itself.
-const TAKEN: &[&str] = &["output", "preview", "timings", "verify"];
+/// Options that the wrapping command sets itself, or that would have every run write over one file.
+const TAKEN: &[&str] = &["output", "preview", "clusters", "timings", "verify"];
 
 impl Wrapped {
     /// Takes the words of a command apart. Errs with what to say to the user.
@@ -179,7 +179,7 @@ mod tests {
         let why = |line| wrapped(line).expect_err("a refusal");
         assert_eq!(
             why("nonsense a"),
-            "there is no command nonsense; those with a trade: voxelize, shadow, smooth-mc"
+            "there is no command nonsense; those with a trade: voxelize, shadow, smooth-mc, tunnels"
         );
         assert_eq!(why("info a"), "info has no trade: it counts, exactly");
         assert_eq!(

@@ -16,6 +16,8 @@ pub struct Trade {
     pub result: &'static str,
     /// Options whose values stand in the input's space; they are moved with it.
     pub placed: &'static [Placed],
+    /// Options whose values name what a changed copy of the input does not hold.
+    pub tied: &'static [Tied],
     /// What the result does not depend on.
     pub invariant: &'static [Invariance],
 }
@@ -41,6 +43,16 @@ pub struct Placed {
     pub option: &'static str,
     /// What its comma-separated numbers are, in order.
     pub parts: &'static [Part],
+}
+
+/// An option whose value names something in the input by what only its own file says of it, such as the
+/// name of a residue: it means nothing, or something else, in a changed copy.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Tied {
+    /// The long option, without dashes.
+    pub option: &'static str,
+    /// What to do instead, as an order.
+    pub instead: &'static str,
 }
 
 /// What some numbers of an option's value are, in the input's space.
@@ -83,9 +95,13 @@ pub struct Measure {
 pub struct Invariance {
     /// The change.
     pub under: Change,
-    /// Options on whose value it depends, with the value that it needs: `("fill", "none")`.
-    pub only: &'static [(&'static str, &'static str)],
+    /// Options on whose value it depends, with the values that it holds for: `("fill", &["none"])`, or
+    /// [`GIVEN`].
+    pub only: &'static [(&'static str, &'static [&'static str])],
 }
+
+/// Any value, where there is one: the user gave it, or it is there by default.
+pub const GIVEN: &[&str] = &[];
 
 impl Invariance {
     /// An invariance under every setting.
@@ -105,13 +121,13 @@ pub enum Change {
     QuarterTurn,
     /// Turned about an axis that is none of the coordinates'.
     Turn,
-    /// Vertices in another order.
+    /// Vertices, or atoms, in another order.
     VertexOrder,
     /// Elements in another order.
     FaceOrder,
     /// Vertices of their own for every element.
     SplitVertices,
-    /// Every element twice.
+    /// Every element, or atom, twice.
     DuplicateFaces,
     /// Triangles without area added at vertices in use.
     DegenerateFaces,
@@ -148,10 +164,9 @@ impl Trade {
     pub fn is_invariant(&self, under: Change, value: impl Fn(&str) -> Option<String>) -> bool {
         self.invariant.iter().any(|row| {
             row.under == under
-                && row
-                    .only
-                    .iter()
-                    .all(|(option, needed)| value(option).as_deref() == Some(*needed))
+                && row.only.iter().all(|(option, fit)| {
+                    value(option).is_some_and(|v| fit.is_empty() || fit.contains(&v.as_str()))
+                })
         })
     }
 }

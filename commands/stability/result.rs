@@ -6,7 +6,6 @@ use crate::wrapped::Wrapped;
 use scantle::image::plot::{Axis, Guide, Line, On, Plot, Point, Scale, Series};
 use scantle::measure::stability::{Drift, Reach, Rounding, Step};
 use scantle::measure::tradeoff::Failed;
-use scantle::mesh::Mesh;
 use schemars::JsonSchema;
 use serde::Serialize;
 use serde_json::Value;
@@ -97,8 +96,9 @@ pub struct Row {
     exit_code: u8,
     /// Why there are no figures.
     message: Option<String>,
-    /// Largest distance from something in one result to the nearest in the other; for pictures the
-    /// largest difference of a channel, where 1 is full.
+    /// Largest distance from something in one result to the nearest in the other, for spheres that of
+    /// their centres or the difference of their radii; for pictures the largest difference of a channel,
+    /// where 1 is full.
     drift: Option<f64>,
     /// The same over the longest side of the input's box; without meaning for pictures, and null.
     drift_relative: Option<f64>,
@@ -106,7 +106,7 @@ pub struct Row {
     differing_voxels: Option<u64>,
     /// How far the rounding of the result's own place moves it; not part of the drift.
     place: Option<f64>,
-    /// How far the input's vertices had to be rounded.
+    /// How far the input's vertices or atoms had to be rounded.
     input_rounding: Option<Rounding>,
     /// The drift that this rounding of the input alone makes; not part of the drift.
     input_drift: Option<f64>,
@@ -186,15 +186,14 @@ impl Row {
 }
 
 impl Stats {
-    /// `in_space` says that drifts are lengths, to be shown as shares of the mesh's extent too.
+    /// `in_space` says that drifts are lengths, to be shown as shares of the input's extent too.
     pub fn new(
-        mesh: &Mesh,
+        extent: f64,
         bound: Option<f64>,
         unit: &'static str,
         in_space: bool,
         mut rows: Vec<Row>,
     ) -> Self {
-        let extent = scantle::measure::stability::extent(mesh);
         for row in &mut rows {
             row.drift_relative = row.drift.filter(|_| in_space).map(|drift| drift / extent);
         }

@@ -180,11 +180,24 @@ pub fn written_beside(path: &Path, format: Format) -> Option<PathBuf> {
     (format == Format::Mhd).then(|| metaimage::data_path(path))
 }
 
+/// Reads a file of one of these kinds; a file of another kind is an error.
+pub fn read_one_of(
+    source: &Source,
+    format: Option<Format>,
+    kinds: &[Kind],
+) -> Result<(Content, Input, Vec<Warning>)> {
+    let read = read(source, format)?;
+    match kinds.contains(&read.0.kind()) {
+        true => Ok(read),
+        false => Err(wrong_kind(source, &read.1.format, &read.0, kinds)),
+    }
+}
+
 /// Reads a mesh; a file of another kind is an error.
 pub fn read_mesh(source: &Source, format: Option<Format>) -> Result<(Mesh, Input, Vec<Warning>)> {
     match read(source, format)? {
         (Content::Mesh(mesh), input, warnings) => Ok((mesh, input, warnings)),
-        (other, input, _) => Err(wrong_kind(source, &input.format, &other, Kind::Mesh)),
+        (other, input, _) => Err(wrong_kind(source, &input.format, &other, &[Kind::Mesh])),
     }
 }
 
@@ -195,7 +208,7 @@ pub fn read_volume(
 ) -> Result<(Volume, Input, Vec<Warning>)> {
     match read(source, format)? {
         (Content::Volume(volume), input, warnings) => Ok((volume, input, warnings)),
-        (other, input, _) => Err(wrong_kind(source, &input.format, &other, Kind::Volume)),
+        (other, input, _) => Err(wrong_kind(source, &input.format, &other, &[Kind::Volume])),
     }
 }
 
@@ -203,7 +216,7 @@ pub fn read_volume(
 pub fn read_image(source: &Source, format: Option<Format>) -> Result<(Image, Input, Vec<Warning>)> {
     match read(source, format)? {
         (Content::Image(image), input, warnings) => Ok((image, input, warnings)),
-        (other, input, _) => Err(wrong_kind(source, &input.format, &other, Kind::Image)),
+        (other, input, _) => Err(wrong_kind(source, &input.format, &other, &[Kind::Image])),
     }
 }
 
@@ -214,7 +227,7 @@ pub fn read_molecule(
 ) -> Result<(Molecule, Input, Vec<Warning>)> {
     match read(source, format)? {
         (Content::Molecule(molecule), input, warnings) => Ok((molecule, input, warnings)),
-        (other, input, _) => Err(wrong_kind(source, &input.format, &other, Kind::Molecule)),
+        (other, input, _) => Err(wrong_kind(source, &input.format, &other, &[Kind::Molecule])),
     }
 }
 
@@ -225,12 +238,13 @@ pub fn read_report(
 ) -> Result<(Vec<Value>, Input, Vec<Warning>)> {
     match read(source, format)? {
         (Content::Report(documents), input, warnings) => Ok((documents, input, warnings)),
-        (other, input, _) => Err(wrong_kind(source, &input.format, &other, Kind::Report)),
+        (other, input, _) => Err(wrong_kind(source, &input.format, &other, &[Kind::Report])),
     }
 }
 
-fn wrong_kind(source: &Source, format: &str, found: &Content, wanted: Kind) -> Error {
-    let (found, wanted) = (found.kind().with_article(), wanted.with_article());
+fn wrong_kind(source: &Source, format: &str, found: &Content, wanted: &[Kind]) -> Error {
+    let wanted: Vec<_> = wanted.iter().map(|kind| kind.with_article()).collect();
+    let (found, wanted) = (found.kind().with_article(), wanted.join(" or "));
     let fault = Fault::whole(format!("holds {found} ({format}), but {wanted} is needed"));
     Refusal::Fault(fault).of(source)
 }

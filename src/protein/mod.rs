@@ -14,6 +14,7 @@ pub mod polymer;
 pub mod radii;
 pub mod select;
 mod spacing;
+mod spheres;
 pub mod start;
 pub mod tunnels;
 

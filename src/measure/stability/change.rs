@@ -1,9 +1,11 @@
-//! The steps: what is done to a mesh, and what of it is rounding.
+//! The steps: what is done to a mesh or to atoms, and what of it is rounding.
 
 use super::motion::Motion;
+use super::subject::Subject;
 use crate::mesh::Mesh;
 use crate::numeric::rng::Rng;
-use crate::numeric::vector::{Vec3, length, sub};
+use crate::numeric::vector::{length, sub};
+use crate::protein::clearance::Ball;
 use crate::trade::Change;
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -21,94 +23,101 @@ pub enum Step {
     Plain(Change),
 }
 
-/// A mesh after a step.
+/// A mesh or atoms after a step.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Changed {
-    /// The mesh.
-    pub mesh: Mesh,
+    /// What became of it.
+    pub subject: Subject,
     /// How it was moved, if it was.
     pub motion: Motion,
-    /// Where coordinates were rounded: the mesh at its old place that `mesh` is, moved exactly.
-    pub rounded: Option<Mesh>,
-    /// How far that moved vertices.
+    /// Where coordinates were rounded: what at the old place `subject` is, moved exactly.
+    pub rounded: Option<Subject>,
+    /// How far that moved vertices or atoms.
     pub rounding: Rounding,
 }
 
-/// How far vertices were moved that should have stayed.
+/// How far vertices or atoms were moved that should have stayed.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, JsonSchema)]
 pub struct Rounding {
-    /// The largest distance, in the mesh's unit.
+    /// The largest distance, in the input's unit.
     pub max: f64,
-    /// The same over the longest side of the mesh's box.
+    /// The same over the longest side of the input's box.
     pub relative: f64,
-    /// The most that a coordinate changed, in units of the last place of the mesh's largest.
+    /// The most that a coordinate changed, in units of the last place of the input's largest.
     pub ulps: f64,
 }
 
 impl Rounding {
-    fn between(from: &Mesh, to: &[Vec3]) -> Self {
+    fn between(from: &Subject, to: &Subject) -> Self {
         let mut found = Rounding::default();
-        let all = from.positions.as_flattened().iter();
+        let points = from.points();
+        let all = points.as_flattened().iter();
         let largest = all.fold(0.0f64, |most, c| most.max(c.abs()));
         let ulp = largest.next_up() - largest;
-        for (a, b) in from.positions.iter().zip(to) {
+        for (a, b) in points.iter().zip(&to.points()) {
             let moved = sub(*b, *a);
             found.max = found.max.max(length(moved));
             let most = moved.iter().fold(0.0f64, |most, c| most.max(c.abs()));
             found.ulps = found.ulps.max(most / ulp);
         }
-        found.relative = found.max / extent(from);
+        found.relative = found.max / from.extent();
         found
     }
-}
-
-/// The longest side of a mesh's box; 1 where it has none.
-pub fn extent(mesh: &Mesh) -> f64 {
-    let sides = mesh.bounds().extent();
-    let longest = sides[0].max(sides[1]).max(sides[2]);
-    if longest > 0.0 { longest } else { 1.0 }
 }
 
 /// Triangles without area that are added.
 const DEGENERATE: u64 = 64;
 
 impl Step {
-    /// Changes a mesh; `seed` draws orders and bits. Errs, with the reason, where the step cannot be
-    /// taken. Faces of more corners than three become the triangles they were split into where
-    /// elements change. Cost: a copy of the mesh.
-    pub fn apply(self, mesh: &Mesh, seed: u64) -> Result<Changed, String> {
+    /// Changes a mesh or atoms; `seed` draws orders and bits. Errs, with the reason, where the step cannot
+    /// be taken. Faces of more corners than three become the triangles they were split into where
+    /// elements change. Cost: a copy.
+    pub fn apply(self, subject: &Subject, seed: u64) -> Result<Changed, String> {
         match self {
-            Step::Scale(exponent) => moved(mesh, Motion::scale(exponent), true),
+            Step::Scale(exponent) => moved(subject, Motion::scale(exponent), true),
             Step::Shift(extents) => {
                 // A power of two has one bit, so adding it keeps as many bits as can be kept.
-                let about = (extents * extent(mesh)).log2().round();
+                let about = (extents * subject.extent()).log2().round();
                 let far = about.exp2();
-                moved(mesh, Motion::shift([far, -0.5 * far, 0.25 * far]), true)
+                moved(subject, Motion::shift([far, -0.5 * far, 0.25 * far]), true)
             }
-            Step::QuarterTurn(axis) => moved(mesh, Motion::quarter_turn(axis), true),
-            Step::Plain(Change::Turn) => moved(mesh, Motion::turn([1.0, 2.0, 3.0], 1.0), false),
+            Step::QuarterTurn(axis) => moved(subject, Motion::quarter_turn(axis), true),
+            Step::Plain(Change::Turn) => moved(subject, Motion::turn([1.0, 2.0, 3.0], 1.0), false),
             Step::Plain(Change::Jitter) => {
-                let mut changed = mesh.clone();
-                for (v, p) in changed.positions.iter_mut().enumerate() {
-                    let mut rng = Rng::new(seed, v as u64);
-                    *p = p.map(|c| [c.next_down(), c, c.next_up()][rng.below(3)]);
-                }
-                let rounding = Rounding::between(mesh, &changed.positions);
+                let changed = subject.with_points(|index, p| {
+                    let mut rng = Rng::new(seed, index as u64);
+                    p.map(|c| [c.next_down(), c, c.next_up()][rng.below(3)])
+                });
+                let rounding = Rounding::between(subject, &changed);
                 finite(Changed {
-                    mesh: changed,
+                    subject: changed,
                     motion: Motion::NONE,
                     rounded: None,
                     rounding,
                 })
             }
             Step::Plain(change) => Ok(Changed {
-                mesh: rearranged(change, mesh, seed)?,
+                subject: match subject {
+                    Subject::Mesh(mesh) => Subject::Mesh(rearranged(change, mesh, seed)?),
+                    Subject::Atoms(balls) => Subject::Atoms(reordered(change, balls, seed)?),
+                },
                 motion: Motion::NONE,
                 rounded: None,
                 rounding: Rounding::default(),
             }),
         }
     }
+}
+
+/// The atoms in another order, or twice: they have no elements to change.
+fn reordered(change: Change, balls: &[Ball], seed: u64) -> Result<Vec<Ball>, String> {
+    let mut changed = balls.to_vec();
+    match change {
+        Change::VertexOrder => shuffle(&mut changed, seed),
+        Change::DuplicateFaces => changed.extend_from_within(..),
+        _ => return Err("atoms have no faces".to_owned()),
+    }
+    Ok(changed)
 }
 
 /// The mesh with other elements, or in another order.
@@ -148,38 +157,24 @@ fn rearranged(change: Change, mesh: &Mesh, seed: u64) -> Result<Mesh, String> {
     Ok(changed)
 }
 
-/// A mesh moved. `exactly` says that the motion, undone, gives back what was really moved.
-fn moved(mesh: &Mesh, motion: Motion, exactly: bool) -> Result<Changed, String> {
-    let mut changed = mesh.clone();
-    let positions = &mut changed.positions;
-    positions.iter_mut().for_each(|p| *p = motion.apply(*p));
-    if let Some(normals) = &mut changed.normals {
-        normals.iter_mut().for_each(|n| *n = motion.turned(*n));
-    }
-    let back: Vec<Vec3> = changed.positions.iter().map(|p| motion.undo(*p)).collect();
-    let rounding = Rounding::between(mesh, &back);
-    let is_rounded = back != mesh.positions;
-    // Only what moves to the same place again stands for the moved mesh.
-    let stands = exactly
-        && back
-            .iter()
-            .zip(&changed.positions)
-            .all(|(b, p)| motion.apply(*b) == *p);
-    let rounded = (is_rounded && stands).then(|| Mesh {
-        positions: back,
-        ..mesh.clone()
-    });
+/// A mesh or atoms moved. `exactly` says that the motion, undone, gives back what was really moved.
+fn moved(subject: &Subject, motion: Motion, exactly: bool) -> Result<Changed, String> {
+    let changed = subject.moved(&motion);
+    let back = subject.taken_back(&changed, &motion);
+    let rounding = Rounding::between(subject, &back);
+    // Only what moves to the same place again stands for what was moved.
+    let is_rounded = !back.stands_as(subject);
+    let stands = exactly && is_rounded && back.moved(&motion).stands_as(&changed);
     finite(Changed {
-        mesh: changed,
+        subject: changed,
         motion,
-        rounded,
+        rounded: stands.then_some(back),
         rounding,
     })
 }
 
 fn finite(changed: Changed) -> Result<Changed, String> {
-    let all = changed.mesh.positions.as_flattened();
-    if all.iter().all(|c| c.is_finite()) {
+    if changed.subject.is_finite() {
         Ok(changed)
     } else {
         Err("coordinates overflow".to_owned())

@@ -17,7 +17,7 @@ use rayon::prelude::*;
 /// How far a result drifted. Lengths are in the unit of the untouched input.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Drift {
-    /// Voxels set in one result and not in the other; `None` for meshes and pictures.
+    /// Voxels set in one result and not in the other; `None` where results have no voxels.
     pub differing: Option<u64>,
     /// Largest distance from something in one result to the nearest in the other; `None` where one
     /// of both is empty and the other is not.
@@ -25,6 +25,21 @@ pub struct Drift {
     /// How far the whole stands from where it should: what the rounding of a grid's origin moves it
     /// by. Not part of `distance`.
     pub place: f64,
+}
+
+impl Drift {
+    /// That of nothing from nothing.
+    pub const NONE: Drift = Drift {
+        differing: None,
+        distance: Some(0.0),
+        place: 0.0,
+    };
+
+    /// That of something from nothing, or the reverse: no distance tells it.
+    pub const ALL: Drift = Drift {
+        distance: None,
+        ..Drift::NONE
+    };
 }
 
 /// How far voxels drifted: `changed` is what became of the input moved by `motion`.

@@ -1,16 +1,20 @@
 //! Inputs at the extremes, and how far the results drift from that of the untouched input.
 //!
-//! A step changes a mesh so that what becomes of the result is known: it moves along, or stays as
+//! A step changes a mesh, or the atoms of a molecule, so that what becomes of the result is known: it moves along, or stays as
 //! it is. Where coordinates had to be rounded, the step says what input it really stands for, so
 //! that a fault of the algorithm is told from the rounding of its input.
 
 mod change;
 mod drift;
 mod motion;
+mod spheres;
+mod subject;
 
-pub use change::{Changed, Rounding, Step, extent};
+pub use change::{Changed, Rounding, Step};
 pub use drift::{Drift, image_drift, mesh_drift, volume_drift};
 pub use motion::Motion;
+pub use spheres::sphere_drift;
+pub use subject::Subject;
 
 use crate::trade::Change;
 use schemars::JsonSchema;

@@ -111,6 +111,11 @@ impl Motion {
         length * 2f64.powi(self.exponent)
     }
 
+    /// Which length becomes this one.
+    pub fn length_back(&self, length: f64) -> f64 {
+        length * 2f64.powi(-self.exponent)
+    }
+
     /// What becomes of the numbers of an option. Errs where there are not as many as the parts take,
     /// one of them overflows, or a box would not stand along the axes.
     pub fn place(&self, parts: &[Part], numbers: &[f64]) -> Result<Vec<f64>, String> {
@@ -126,7 +131,7 @@ impl Motion {
     /// Where the numbers of an option come from: [`Motion::place`] undone.
     pub fn place_back(&self, parts: &[Part], numbers: &[f64]) -> Result<Vec<f64>, String> {
         self.each(parts, numbers, |part, n| match part {
-            Part::Length => vec![n[0] * 2f64.powi(-self.exponent)],
+            Part::Length => vec![self.length_back(n[0])],
             Part::Point => self.undo([n[0], n[1], n[2]]).to_vec(),
             Part::Direction => self.turned_back([n[0], n[1], n[2]]).to_vec(),
             Part::Box => boxed(n, |corner| self.undo(corner)),

@@ -2,9 +2,36 @@ use super::*;
 use crate::mesh::Mesh;
 use crate::mesh::shapes::{octasphere, torus_knot};
 use crate::numeric::vector::{Vec3, length, sub};
+use crate::protein::clearance::Ball;
 use crate::trade::{Change, Part};
 use crate::volume::bits::BitGrid;
 use crate::volume::{Data, Frame, Volume};
+
+/// A step of a mesh.
+fn step(step: Step, mesh: &Mesh, seed: u64) -> Result<Changed, String> {
+    step.apply(&Subject::Mesh(mesh.clone()), seed)
+}
+
+/// A step of a mesh that moves nothing.
+fn rearranged(change: Change, mesh: &Mesh, seed: u64) -> Mesh {
+    let changed = step(Step::Plain(change), mesh, seed).expect("a mesh");
+    assert_eq!(changed.motion, Motion::NONE);
+    mesh_of(changed.subject)
+}
+
+fn mesh_of(subject: Subject) -> Mesh {
+    match subject {
+        Subject::Mesh(mesh) => mesh,
+        Subject::Atoms(_) => panic!("no mesh"),
+    }
+}
+
+fn atoms_of(subject: Subject) -> Vec<Ball> {
+    match subject {
+        Subject::Atoms(balls) => balls,
+        Subject::Mesh(_) => panic!("no atoms"),
+    }
+}
 
 fn ball() -> Mesh {
     octasphere([0.3, -0.2, 0.1], 1.25, 8)
@@ -72,29 +99,27 @@ fn options_move_as_what_they_are() {
 #[test]
 fn a_shift_that_rounds_says_what_was_moved_exactly() {
     let mesh = ball();
-    let near = Step::Scale(-100).apply(&mesh, 0).expect("a mesh");
+    let near = step(Step::Scale(-100), &mesh, 0).expect("a mesh");
     assert_eq!((near.rounding, &near.rounded), (Rounding::default(), &None));
-    let far = Step::Shift(1e9).apply(&mesh, 0).expect("a mesh");
-    let rounded = far.rounded.expect("coordinates that are rounded");
+    let far = step(Step::Shift(1e9), &mesh, 0).expect("a mesh");
+    let rounded = mesh_of(far.rounded.expect("coordinates that are rounded"));
     assert!(far.rounding.relative > 1e-10 && far.rounding.relative < 1e-6);
     assert!(far.rounding.ulps > 1.0);
-    for (there, here) in far.mesh.positions.iter().zip(&rounded.positions) {
+    for (there, here) in mesh_of(far.subject)
+        .positions
+        .iter()
+        .zip(&rounded.positions)
+    {
         assert_eq!(far.motion.apply(*here), *there);
         assert_eq!(far.motion.undo(*there), *here);
     }
-    let again = Step::Shift(1e9).apply(&rounded, 0).expect("a mesh");
+    let again = step(Step::Shift(1e9), &rounded, 0).expect("a mesh");
     assert_eq!((again.rounding, again.rounded), (Rounding::default(), None));
-    assert!(
-        Step::Scale(1020)
-            .apply(
-                &Mesh {
-                    positions: vec![[1e10; 3]],
-                    ..Mesh::default()
-                },
-                0
-            )
-            .is_err()
-    );
+    let huge = Mesh {
+        positions: vec![[1e10; 3]],
+        ..Mesh::default()
+    };
+    assert!(step(Step::Scale(1020), &huge, 0).is_err());
 }
 
 #[test]
@@ -108,39 +133,134 @@ fn elements_are_rearranged_and_stay_the_same() {
         all
     };
     let wanted = corners(&mesh);
-    for step in [
-        Step::Plain(Change::VertexOrder),
-        Step::Plain(Change::FaceOrder),
-        Step::Plain(Change::SplitVertices),
+    for change in [
+        Change::VertexOrder,
+        Change::FaceOrder,
+        Change::SplitVertices,
     ] {
-        let changed = step.apply(&mesh, 7).expect("a mesh").mesh;
+        let changed = rearranged(change, &mesh, 7);
         assert_eq!(changed.check(), Ok(()));
-        assert_eq!(corners(&changed), wanted, "{step:?}");
-        assert!(changed != mesh, "{step:?}");
+        assert_eq!(corners(&changed), wanted, "{change:?}");
+        assert!(changed != mesh, "{change:?}");
     }
-    let split = Step::Plain(Change::SplitVertices)
-        .apply(&mesh, 0)
-        .expect("a mesh")
-        .mesh;
+    let split = rearranged(Change::SplitVertices, &mesh, 0);
     assert_eq!(split.positions.len(), 3 * mesh.triangles.len());
-    let twice = Step::Plain(Change::DuplicateFaces)
-        .apply(&mesh, 0)
-        .expect("a mesh")
-        .mesh;
+    let twice = rearranged(Change::DuplicateFaces, &mesh, 0);
     assert_eq!(twice.triangles.len(), 2 * mesh.triangles.len());
-    let more = Step::Plain(Change::DegenerateFaces)
-        .apply(&mesh, 0)
-        .expect("a mesh")
-        .mesh;
+    let more = rearranged(Change::DegenerateFaces, &mesh, 0);
     let flat = &more.triangles[mesh.triangles.len()..];
     assert!(flat.len() == 64 && flat.iter().all(|[a, b, c]| b == c || a == b));
-    assert!(
-        Step::Plain(Change::DegenerateFaces)
-            .apply(&Mesh::default(), 0)
-            .is_err()
-    );
-    let jitter = Step::Plain(Change::Jitter).apply(&mesh, 0).expect("a mesh");
+    assert!(step(Step::Plain(Change::DegenerateFaces), &Mesh::default(), 0).is_err());
+    let jitter = step(Step::Plain(Change::Jitter), &mesh, 0).expect("a mesh");
     assert_eq!(jitter.rounding.ulps, 1.0);
+}
+
+fn atoms() -> Vec<Ball> {
+    let atom = |k: u32| {
+        let at = f64::from(k);
+        Ball {
+            centre: [at.sin() * 9.0, at.cos() * 7.0, 0.1 * at],
+            radius: 1.2 + 0.01 * at,
+        }
+    };
+    (0..60).map(atom).collect()
+}
+
+#[test]
+fn atoms_move_with_their_radii_and_are_reordered_and_doubled() {
+    let balls = atoms();
+    let subject = Subject::Atoms(balls.clone());
+    let apply = |step: Step| step.apply(&subject, 3).expect("atoms");
+    let small = apply(Step::Scale(-60));
+    assert_eq!(
+        (small.rounding, &small.rounded),
+        (Rounding::default(), &None)
+    );
+    let factor = 2f64.powi(-60);
+    for (a, b) in atoms_of(small.subject).iter().zip(&balls) {
+        assert_eq!(
+            (a.centre, a.radius),
+            (b.centre.map(|c| c * factor), b.radius * factor)
+        );
+    }
+    let far = apply(Step::Shift(1e9));
+    let rounded = atoms_of(far.rounded.expect("centres that are rounded"));
+    assert!(far.rounding.max > 0.0 && far.rounding.relative < 1e-6);
+    for ((there, here), given) in atoms_of(far.subject).iter().zip(&rounded).zip(&balls) {
+        assert_eq!(far.motion.apply(here.centre), there.centre);
+        assert_eq!([there.radius, here.radius], [given.radius; 2]);
+    }
+    let quarter = atoms_of(apply(Step::QuarterTurn(2)).subject);
+    let [x, y, z] = balls[7].centre;
+    assert_eq!(
+        (quarter[7].centre, quarter[7].radius),
+        ([-y, x, z], balls[7].radius)
+    );
+    let other = atoms_of(apply(Step::Plain(Change::VertexOrder)).subject);
+    assert!(other != balls && balls.iter().all(|ball| other.contains(ball)));
+    let twice = atoms_of(apply(Step::Plain(Change::DuplicateFaces)).subject);
+    assert_eq!(twice, [&balls[..], &balls].concat());
+    let jitter = apply(Step::Plain(Change::Jitter));
+    assert!(jitter.rounding.max > 0.0 && jitter.rounding.ulps <= 1.0);
+    for change in [
+        Change::FaceOrder,
+        Change::SplitVertices,
+        Change::DegenerateFaces,
+    ] {
+        let refused = Step::Plain(change).apply(&subject, 3);
+        assert_eq!(refused, Err("atoms have no faces".to_owned()), "{change:?}");
+    }
+    // A radius that becomes too small for all its digits is rounded, as a coordinate is.
+    let tiny = [Ball {
+        centre: [0.0; 3],
+        radius: 1.7,
+    }; 2];
+    let lost = Step::Scale(-1070).apply(&Subject::Atoms(tiny.to_vec()), 0);
+    assert!(lost.expect("atoms").rounded.is_some());
+}
+
+#[test]
+fn spheres_drift_by_centres_and_radii() {
+    let balls = atoms();
+    let distance = |a: &[Ball], b: &[Ball], motion: &Motion| sphere_drift(a, b, motion).distance;
+    let both = Motion {
+        exponent: -7,
+        shift: [8.0, -4.0, 2.0],
+        ..Motion::quarter_turn(1)
+    };
+    let moved: Vec<Ball> = balls
+        .iter()
+        .map(|ball| Ball {
+            centre: both.apply(ball.centre),
+            radius: both.length(ball.radius),
+        })
+        .collect();
+    assert!(distance(&balls, &moved, &both).is_some_and(|d| d < 1e-12));
+    let mut wrong = balls.clone();
+    wrong[5].radius += 0.25;
+    assert_eq!(distance(&balls, &wrong, &Motion::NONE), Some(0.25));
+    wrong[9].centre[2] += 0.5;
+    assert_eq!(distance(&balls, &wrong, &Motion::NONE), Some(0.5));
+    // One more beside another is as far as that, wherever it stands in the order.
+    let mut more = balls.clone();
+    let near = Ball {
+        centre: [
+            balls[30].centre[0],
+            balls[30].centre[1],
+            balls[30].centre[2] + 0.125,
+        ],
+        ..balls[30]
+    };
+    more.insert(0, near);
+    let drift = distance(&balls, &more, &Motion::NONE);
+    assert!(
+        drift.is_some_and(|d| (d - 0.125).abs() < 1e-12),
+        "{drift:?}"
+    );
+    assert_eq!(drift, distance(&more, &balls, &Motion::NONE));
+    assert_eq!(distance(&balls, &[], &Motion::NONE), None);
+    assert_eq!(distance(&[], &balls, &Motion::NONE), None);
+    assert_eq!(distance(&[], &[], &Motion::NONE), Some(0.0));
 }
 
 fn volume(dims: [usize; 3], origin: Vec3, set: &[[usize; 3]]) -> Volume {
@@ -212,8 +332,9 @@ fn voxels_that_moved_along_did_not_drift() {
 #[test]
 fn meshes_drift_by_their_distance() {
     let mesh = torus_knot(2, 3, 3.0, 32, 6);
-    let changed = Step::Plain(Change::Turn).apply(&mesh, 0).expect("a mesh");
-    let drift = mesh_drift(&mesh, &changed.mesh, &changed.motion).expect("meshes");
+    let changed = step(Step::Plain(Change::Turn), &mesh, 0).expect("a mesh");
+    let turned = mesh_of(changed.subject);
+    let drift = mesh_drift(&mesh, &turned, &changed.motion).expect("meshes");
     assert!(drift.distance.is_some_and(|d| d < 1e-12), "{drift:?}");
     let off = Motion::shift([0.0, 0.0, 0.5]);
     let drift = mesh_drift(&mesh, &mesh, &off).expect("meshes");

@@ -55,6 +55,7 @@ pub const TRADE: Trade = Trade {
             parts: &[Part::Point, Part::Point, Part::Direction, Part::Number],
         },
     ],
+    tied: &[],
     invariant: &[
         Invariance::always(Change::Scale),
         Invariance::always(Change::Shift),

@@ -37,6 +37,7 @@ pub const TRADE: Trade = Trade {
     reference: "the least bending in the diamond, after a thousand steps",
     result: "ply",
     placed: &[],
+    tied: &[],
     invariant: &[
         Invariance::always(Change::Scale),
         Invariance::always(Change::Shift),

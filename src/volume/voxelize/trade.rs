@@ -56,6 +56,7 @@ pub const TRADE: Trade = Trade {
             parts: &[Part::Box],
         },
     ],
+    tied: &[],
     invariant: &[
         Invariance::always(Change::Scale),
         Invariance::always(Change::Shift),
@@ -66,7 +67,7 @@ pub const TRADE: Trade = Trade {
         // Two surfaces at one place are two crossings, and wind twice.
         Invariance {
             under: Change::DuplicateFaces,
-            only: &[("fill", "none")],
+            only: &[("fill", &["none"])],
         },
     ],
 };

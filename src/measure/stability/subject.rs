@@ -1,0 +1,100 @@
+//! What is taken to the extremes: a mesh, or the atoms of a molecule.
+
+use super::motion::Motion;
+use crate::mesh::Mesh;
+use crate::numeric::vector::Vec3;
+use crate::protein::clearance::Ball;
+use crate::spatial::aabb::Aabb;
+
+/// What a command reads.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Subject {
+    /// Triangles, polylines, points.
+    Mesh(Mesh),
+    /// Atoms: points with radii, which are lengths.
+    Atoms(Vec<Ball>),
+}
+
+impl Subject {
+    /// The points that are moved: vertices, or centres of atoms. Cost: a copy of them.
+    pub fn points(&self) -> Vec<Vec3> {
+        match self {
+            Subject::Mesh(mesh) => mesh.positions.clone(),
+            Subject::Atoms(balls) => balls.iter().map(|ball| ball.centre).collect(),
+        }
+    }
+
+    /// The longest side of the box around its points, in its unit; 1 where it has none. Cost: linear.
+    pub fn extent(&self) -> f64 {
+        let bounds = match self {
+            Subject::Mesh(mesh) => mesh.bounds(),
+            Subject::Atoms(balls) => Aabb::around(balls.iter().map(|ball| &ball.centre)),
+        };
+        let sides = bounds.extent();
+        let longest = sides[0].max(sides[1]).max(sides[2]);
+        if longest > 0.0 { longest } else { 1.0 }
+    }
+
+    /// The same with its points changed, given the index of each. Cost: a copy.
+    pub(super) fn with_points(&self, change: impl Fn(usize, Vec3) -> Vec3) -> Subject {
+        let mut changed = self.clone();
+        let each = |(index, p): (usize, &mut Vec3)| *p = change(index, *p);
+        match &mut changed {
+            Subject::Mesh(mesh) => mesh.positions.iter_mut().enumerate().for_each(each),
+            Subject::Atoms(balls) => {
+                let centres = balls.iter_mut().map(|ball| &mut ball.centre);
+                centres.enumerate().for_each(each);
+            }
+        }
+        changed
+    }
+
+    /// The same moved: points, directions and lengths.
+    pub(super) fn moved(&self, motion: &Motion) -> Subject {
+        let mut changed = self.with_points(|_, p| motion.apply(p));
+        match &mut changed {
+            Subject::Mesh(mesh) => {
+                let normals = mesh.normals.iter_mut().flatten();
+                normals.for_each(|n| *n = motion.turned(*n));
+            }
+            Subject::Atoms(balls) => {
+                let radii = balls.iter_mut().map(|ball| &mut ball.radius);
+                radii.for_each(|r| *r = motion.length(*r));
+            }
+        }
+        changed
+    }
+
+    /// The same with the points and lengths that `moved` has, taken back.
+    pub(super) fn taken_back(&self, moved: &Subject, motion: &Motion) -> Subject {
+        match moved {
+            Subject::Atoms(balls) => {
+                let back = |ball: &Ball| Ball {
+                    centre: motion.undo(ball.centre),
+                    radius: motion.length_back(ball.radius),
+                };
+                Subject::Atoms(balls.iter().map(back).collect())
+            }
+            // What else a mesh has is as it was.
+            Subject::Mesh(mesh) => self.with_points(|v, _| motion.undo(mesh.positions[v])),
+        }
+    }
+
+    /// Whether all points and lengths are where they are in the other.
+    pub(super) fn stands_as(&self, other: &Subject) -> bool {
+        match (self, other) {
+            (Subject::Mesh(a), Subject::Mesh(b)) => a.positions == b.positions,
+            (a, b) => a == b,
+        }
+    }
+
+    /// Whether all points and lengths are finite.
+    pub(super) fn is_finite(&self) -> bool {
+        match self {
+            Subject::Mesh(mesh) => mesh.positions.as_flattened().iter().all(|c| c.is_finite()),
+            Subject::Atoms(balls) => balls
+                .iter()
+                .all(|ball| ball.radius.is_finite() && ball.centre.iter().all(|c| c.is_finite())),
+        }
+    }
+}
