@@ -177,18 +177,7 @@ pub fn surface(
     let mut sides = Vec::new();
     for ((number, tube), lattice) in (1..).zip(&tubes).zip(&lattices) {
         let mesh = union(tube, lattice, progress)?;
-        let first = joined.positions.len();
-        if first + mesh.positions.len() > u32::MAX as usize {
-            return Err(Error::Limit {
-                what: "the surface of the tunnels".into(),
-                needed: format!("over {first} vertices"),
-                limit: format!("{} vertices", u32::MAX),
-                hint: Some("a larger spacing takes fewer".into()),
-            });
-        }
-        joined.positions.extend(mesh.positions);
-        let moved = mesh.triangles.iter().map(|t| t.map(|v| v + first as u32));
-        joined.triangles.extend(moved);
+        joined.append(&mesh)?;
         sides.resize(joined.triangles.len(), [number, 0]);
     }
     joined.sides = Some(sides);
