@@ -5,7 +5,7 @@ use crate::streams::say;
 use crate::trade::{Declared, TABLE};
 use crate::{
     compare, completions, convert, formats, info, isosurface, man, schema, shadow, smooth_mc,
-    stability, tradeoff, voxelize,
+    stability, tradeoff, tunnels, voxelize,
 };
 use clap::error::ErrorKind;
 use clap::{Arg, CommandFactory, FromArgMatches, Parser, Subcommand};
@@ -30,6 +30,7 @@ pub enum Command {
     Shadow(Box<shadow::Args>),
     SmoothMc(Box<smooth_mc::Args>),
     Isosurface(isosurface::Args),
+    Tunnels(Box<tunnels::Args>),
     Info(info::Args),
     Compare(compare::Args),
     Convert(convert::Args),
@@ -46,6 +47,7 @@ const GROUPS: &[(&str, &[&str])] = &[
     ("Mesh to volume", &["voxelize"]),
     ("Mesh to picture", &["shadow"]),
     ("Volume to mesh", &["smooth-mc", "isosurface"]),
+    ("Molecules", &["tunnels"]),
     ("Any file", &["info", "convert", "compare"]),
     ("Any command", &["tradeoff", "stability"]),
     (

@@ -192,6 +192,11 @@ impl<'a> Job<'a> {
         self.read_with(io::read_volume)
     }
 
+    /// Reads the next input, which must be a molecule.
+    pub fn read_molecule(&mut self) -> Result<Molecule> {
+        self.read_with(io::read_molecule)
+    }
+
     /// Reads the next input, which must be an image.
     pub fn read_image(&mut self) -> Result<Image> {
         self.read_with(io::read_image)

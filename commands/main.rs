@@ -31,6 +31,7 @@ mod shadow;
 mod smooth_mc;
 mod stability;
 mod tradeoff;
+mod tunnels;
 mod voxelize;
 
 use cli::Command;
@@ -51,6 +52,7 @@ fn run(command: &Command) -> Exit {
         Command::Shadow(args) => shadow::run(args),
         Command::SmoothMc(args) => smooth_mc::run(args),
         Command::Isosurface(args) => isosurface::run(args),
+        Command::Tunnels(args) => tunnels::run(args),
         Command::Info(args) => info::run(args),
         Command::Compare(args) => compare::run(args),
         Command::Convert(args) => convert::run(args),

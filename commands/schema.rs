@@ -3,8 +3,8 @@
 use crate::exit::Exit;
 use crate::streams::print;
 use crate::{
-    compare, convert, formats, info, isosurface, shadow, smooth_mc, stability, tradeoff, voxelize,
-    words,
+    compare, convert, formats, info, isosurface, shadow, smooth_mc, stability, tradeoff, tunnels,
+    voxelize, words,
 };
 use clap::builder::PossibleValuesParser;
 use scantle::error::Result;
@@ -37,6 +37,7 @@ const SCHEMAS: &[Row] = &[
     ("formats", || schema_for!(formats::Table)),
     ("info", || schema_for!(info::Report)),
     ("isosurface", || schema_for!(isosurface::Report)),
+    ("tunnels", || schema_for!(tunnels::Report)),
     ("shadow", || schema_for!(shadow::Report)),
     ("smooth-mc", || schema_for!(smooth_mc::Report)),
     ("stability", || schema_for!(stability::Report)),

@@ -1,5 +1,6 @@
 //! Which commands trade accuracy for time, and why the others do not.
 
+use scantle::protein::tunnels;
 use scantle::render::shadow;
 use scantle::trade::Trade;
 use scantle::volume::{smooth_mc, voxelize};
@@ -39,6 +40,7 @@ pub const TABLE: &[(&str, Declared)] = &[
     ("voxelize", Declared::Trade(&voxelize::TRADE)),
     ("shadow", Declared::Trade(&shadow::TRADE)),
     ("smooth-mc", Declared::Trade(&smooth_mc::TRADE)),
+    ("tunnels", Declared::Trade(&tunnels::TRADE)),
     (
         "isosurface",
         Declared::None("its vertices lie where linear interpolation meets the level"),

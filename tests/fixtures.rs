@@ -6,9 +6,11 @@
 use crate::support::{Workplace, files_below, root, updating};
 use scantle::io::sink::Sink;
 use scantle::io::source::Source;
-use scantle::io::{read_mesh, write_mesh, write_volume};
+use scantle::io::{read_mesh, read_molecule, write_mesh, write_molecule, write_volume};
 use scantle::mesh::{Mesh, shapes};
 use scantle::progress::Silent;
+use scantle::protein::builder::{Builder, Place};
+use scantle::protein::{Atom, Element, Molecule, Name};
 use scantle::volume::isosurface::{Border, Select, at_level, axis_of, extract};
 use scantle::volume::{Data, Frame, Volume};
 use std::fs;
@@ -58,6 +60,136 @@ const VOLUMES: &[Row<Volume>] = &[
         ..of_values(|_| 0)
     }),
 ];
+
+const MOLECULES: &[Row<Molecule>] = &[
+    ("molecules/helix.pdb", helix_of_atoms),
+    ("molecules/helix.cif", helix_of_atoms),
+    ("molecules/ring.xyzr", ring_of_spheres),
+    ("molecules/ring.csv", ring_of_spheres),
+];
+
+/// An atom as a molecule has it: its place and name in a residue, an element and a letter.
+fn atom(position: [f64; 3], name: &str, symbol: &str, hetero: bool) -> Atom {
+    Atom {
+        position: position.map(|c| (c * 1000.0).round() / 1000.0),
+        radius: None,
+        serial: 0,
+        name: Name::new(name.as_bytes()).expect("a name"),
+        residue: 0,
+        occupancy: 1.0,
+        b_factor: 20.0,
+        element: Element::from_symbol(symbol.as_bytes()).unwrap_or_default(),
+        altloc: b' ',
+        hetero,
+    }
+}
+
+fn at_place(name: &str, chain: &str, number: i32) -> Place {
+    Place {
+        name: Name::new(name.as_bytes()).expect("a name"),
+        chain: Name::new(chain.as_bytes()).expect("a name"),
+        number,
+        insertion: b' ',
+        in_polymer: false,
+    }
+}
+
+/// Atoms of a residue of an alpha helix, by radius, angle in degrees and height from its first carbon:
+/// bonds within 0.02 angstrom of those of proteins.
+const OF_A_HELIX: [(&str, [f64; 3]); 5] = [
+    ("N", [1.57, -27.7, -0.87]),
+    ("CA", [2.29, 0.0, 0.0]),
+    ("C", [1.66, 26.5, 1.07]),
+    ("O", [1.93, 31.0, 2.28]),
+    ("CB", [3.29, -18.0, 0.77]),
+];
+
+/// Two models of a helix of ten alanines, one of them selenomethionine's name, one with an insertion code,
+/// one a serine with its oxygen at two places and one at a place that it shares with a glycine; a zinc
+/// ion, a ring of carbons and three molecules of water, whose numbers go on in base 36.
+fn helix_of_atoms() -> Molecule {
+    let mut builder = Builder::default();
+    builder.set_id("0HLX".to_owned());
+    for model in 1..=2 {
+        builder.begin_model(model);
+        let mut serial = 99_960;
+        let mut put = |builder: &mut Builder, place: &Place, atom: Atom| {
+            serial += 1;
+            builder.push(place, Atom { serial, ..atom }).expect("room");
+        };
+        // The second model is turned a little about the axis.
+        let turned = 5.0 * f64::from(model - 1);
+        for index in 0..10 {
+            let around = |[radius, angle, height]: [f64; 3]| {
+                let (sin, cos) = (angle + turned + 100.0 * f64::from(index))
+                    .to_radians()
+                    .sin_cos();
+                [radius * cos, radius * sin, height + 1.5 * f64::from(index)]
+            };
+            let (name, number, insertion) = match index {
+                3 => ("MSE", 4, b' '),
+                5 => ("ALA", 5, b'A'),
+                6 => ("SER", 6, b' '),
+                _ => ("ALA", if index > 5 { index } else { index + 1 }, b' '),
+            };
+            let place = Place {
+                insertion,
+                in_polymer: name == "MSE",
+                ..at_place(name, "A", number)
+            };
+            for (atom_name, polar) in OF_A_HELIX {
+                let found = atom(around(polar), atom_name, &atom_name[..1], name == "MSE");
+                put(&mut builder, &place, found);
+            }
+            if name == "SER" {
+                for (altloc, angle, occupancy) in [(b'A', -10.0, 0.6), (b'B', -26.0, 0.4)] {
+                    let found = atom(around([4.4, angle, 0.2]), "OG", "O", false);
+                    let found = Atom {
+                        altloc,
+                        occupancy,
+                        ..found
+                    };
+                    put(&mut builder, &place, found);
+                }
+            }
+        }
+        put(
+            &mut builder,
+            &at_place("ZN", "B", 9998),
+            atom([9.0, 0.0, 7.0], "ZN", "ZN", true),
+        );
+        for index in 0..6 {
+            let (sin, cos) = (60.0 * f64::from(index)).to_radians().sin_cos();
+            let found = atom(
+                [1.39 * cos, 12.0 + 1.39 * sin, 7.0],
+                &format!("C{}", index + 1),
+                "C",
+                true,
+            );
+            put(&mut builder, &at_place("BNZ", "B", 9999), found);
+        }
+        for index in 0..3 {
+            let found = atom([-8.0, 3.0 * f64::from(index), 7.0], "O", "O", true);
+            put(&mut builder, &at_place("HOH", "B", 10_000 + index), found);
+        }
+    }
+    builder.finish()
+}
+
+/// Eight spheres in a circle of radius 4, of radii from 1.2 to 1.9.
+fn ring_of_spheres() -> Molecule {
+    let mut builder = Builder::default();
+    for index in 0..8 {
+        let (sin, cos) = (45.0 * f64::from(index)).to_radians().sin_cos();
+        let sphere = Atom {
+            radius: Some(1.2 + f64::from(index) / 10.0),
+            serial: i64::from(index) + 1,
+            ..atom([4.0 * cos, 4.0 * sin, 0.0], "", "", false)
+        };
+        builder.push(&at_place("", "", 0), sphere).expect("room");
+    }
+    builder.finish()
+}
 
 /// Vertices along three turns of a helix: radius 1, height 1.5, 32 to a turn.
 fn helix(n: u32) -> Mesh {
@@ -146,7 +278,8 @@ fn marching_cubes(grey: bool) -> Mesh {
     Mesh::from_triangles(positions, triangles)
 }
 
-/// Whether two files are the same, or hold meshes that differ by the roundings of single precision.
+/// Whether two files are the same, or hold meshes that differ by the roundings of single precision, or
+/// molecules that differ by the last digit of a PDB file.
 fn are_near(name: &str, a: Vec<u8>, b: Vec<u8>) -> bool {
     let mesh = |bytes| {
         let source = Source::from_bytes(name, bytes).ok()?;
@@ -154,6 +287,21 @@ fn are_near(name: &str, a: Vec<u8>, b: Vec<u8>) -> bool {
     };
     if a == b {
         return true;
+    }
+    let molecule = |bytes: &[u8]| {
+        let source = Source::from_bytes(name, bytes.to_vec()).ok()?;
+        read_molecule(&source, None)
+            .ok()
+            .map(|(molecule, _, _)| molecule)
+    };
+    if let (Some(mut a), Some(b)) = (molecule(&a), molecule(&b)) {
+        let mut atoms = a.atoms.iter_mut().zip(&b.atoms);
+        let near = atoms.all(|(x, y)| {
+            let near = (0..3).all(|k| (x.position[k] - y.position[k]).abs() < 1.5e-3);
+            x.position = y.position;
+            near
+        });
+        return near && a == b;
     }
     let (Some(a), Some(b)) = (mesh(a), mesh(b)) else {
         return false;
@@ -198,6 +346,12 @@ fn made_fixtures_are_current() {
         check(name, &|sink| {
             let format = sink.format().expect("the name tells the format");
             write_volume(&make(), sink, format).map(drop)
+        });
+    }
+    for (name, make) in MOLECULES {
+        check(name, &|sink| {
+            let format = sink.format().expect("the name tells the format");
+            write_molecule(&make(), sink, format).map(drop)
         });
     }
     assert!(stale.is_empty(), "{stale:?} are not what the formula makes");

@@ -63,6 +63,10 @@ const MADE: &[(&str, &str)] = &[
     ),
     ("a.png", "convert fixtures/images/pattern.png -o a.png"),
     ("b.png", "convert fixtures/images/ramp16.png -o b.png"),
+    ("a.pdb", "convert fixtures/molecules/helix.cif -o a.pdb"),
+    ("a.cif", "convert fixtures/molecules/helix.pdb -o a.cif"),
+    ("a.xyzr", "convert fixtures/molecules/ring.csv -o a.xyzr"),
+    ("a.csv", "convert fixtures/molecules/ring.xyzr -o a.csv"),
 ];
 
 /// Files that are read but not written like this.
@@ -89,6 +93,12 @@ const WRITTEN: &[(&str, &str)] = &[
         {"bufferView":1,"componentType":5121,"count":3,"type":"SCALAR"}],
         "bufferViews":[{"buffer":0,"byteLength":36},{"buffer":0,"byteOffset":36,"byteLength":3}],
         "buffers":[{"byteLength":39,"uri":"data:application/octet-stream;base64,AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAgD8AAAAAAAEC"}]}"#,
+    ),
+    (
+        "text.pqr",
+        "REMARK   1 PQR\nATOM      1  N   GLY A   1       0.000   0.000   0.000  0.2943 1.8240\n\
+         ATOM      2  CA  GLY A   1       1.450   0.000   0.000 -0.0100 1.9080\nTER\n\
+         HETATM    3 ZN   ZN      2       5.000   0.000   0.000  2.0000 1.1000\nEND\n",
     ),
     (
         "text.json",
@@ -183,7 +193,10 @@ fn set_checksums(png: &mut [u8]) {
 /// Reads the variants of a file in one process; returns how many were read and how many refused.
 fn read_variants(place: &Workplace, name: &str, bytes: &[u8], seed: u64) -> [usize; 2] {
     let (stem, extension) = name.split_once('.').expect("an extension");
-    let format = extension.trim_end_matches(".gz");
+    let format = match extension.trim_end_matches(".gz") {
+        "csv" => "spheres-csv",
+        format => format,
+    };
     for index in 0..VARIANTS {
         let name = format!("{stem}-{index:03}-.{extension}");
         let mut changed = variant(bytes, seed, index);

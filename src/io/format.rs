@@ -451,6 +451,16 @@ pub fn sniff(bytes: &[u8], extension: Option<&str>) -> Result<Format, Fault> {
         let is_gltf = super::gltf::is_document(text);
         return Ok(if is_gltf { Format::Gltf } else { Format::Json });
     }
+    if super::mmcif::is_document(text) {
+        return Ok(Format::Cif);
+    }
+    if super::pdb::is_document(text) {
+        let is_pqr = super::pqr::is_document(text);
+        return Ok(if is_pqr { Format::Pqr } else { Format::Pdb });
+    }
+    if super::xyzr::is_document(text) {
+        return Ok(Format::SpheresCsv);
+    }
     let names: Vec<_> = Format::all()
         .filter(|f| f.is_read())
         .map(Format::name)

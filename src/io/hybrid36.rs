@@ -6,8 +6,8 @@
 
 /// The number that a word of `width` columns says; `None` where it is no number.
 ///
-/// A word that begins with a digit and has letters of one to f is hexadecimal, as VMD and NAMD
-/// count on after 99999.
+/// A word of five columns or more that begins with a digit and has letters up to f is hexadecimal, as
+/// VMD and NAMD count on after 99999.
 pub fn read(word: &[u8], width: u32) -> Option<i64> {
     let upper = word
         .iter()
@@ -23,7 +23,7 @@ pub fn read(word: &[u8], width: u32) -> Option<i64> {
             let value = in_base(word, 36)?;
             Some(value + offset(width, lower))
         }
-        b'0'..=b'9' if (upper || lower) && word.iter().any(u8::is_ascii_alphabetic) => {
+        b'0'..=b'9' if word.len() >= 5 && word.iter().any(u8::is_ascii_alphabetic) => {
             in_base(word, 16)
         }
         _ => super::text::integer(word),
@@ -37,7 +37,7 @@ pub fn write(number: i64, width: u32) -> Option<String> {
         return Some(number.to_string());
     }
     let letters = |lower: bool| -> Option<String> {
-        let value = number - offset(width, lower);
+        let value = number.checked_sub(offset(width, lower))?;
         let digit = |place: u32| {
             let digit = value / 36i64.pow(place) % 36;
             char::from_digit(digit as u32, 36)
@@ -89,7 +89,9 @@ mod tests {
             assert_eq!(write(number, width).as_deref(), Some(word), "{number}");
         }
         assert_eq!(read(b"186a0", 5), Some(100_000));
-        for word in ["", "A00", "A00a0", "Aa000", "*****", "1.5", "1g", "A00-0"] {
+        for word in [
+            "", "A00", "A00a0", "Aa000", "*****", "1.5", "1g", "A00-0", "52A", "1 0a0",
+        ] {
             assert_eq!(read(word.as_bytes(), 5), None, "{word}");
         }
         for number in [87_440_032, -10_000, i64::MAX, i64::MIN] {

@@ -14,6 +14,7 @@ mod header;
 mod hybrid36;
 pub mod json;
 pub mod metaimage;
+pub mod mmcif;
 pub mod nifti;
 pub mod npy;
 pub mod nrrd;
@@ -24,6 +25,7 @@ pub mod pdb;
 mod peers;
 pub mod ply;
 pub mod png;
+pub mod pqr;
 pub mod refusal;
 mod samples;
 pub mod sink;
@@ -34,6 +36,7 @@ mod text;
 pub mod vdb;
 pub mod vti;
 mod xml;
+pub mod xyzr;
 
 #[cfg(test)]
 mod roundtrip;
@@ -137,9 +140,10 @@ fn parse(source: &Source, format: Format, warnings: &mut Vec<Warning>) -> Result
         Format::Vti => Content::Volume(vti::read(source, warnings)?),
         Format::Png => Content::Image(png::read(source)?),
         Format::Pdb => Content::Molecule(pdb::read(source, warnings)?),
-        Format::Cif | Format::Pqr | Format::Xyzr | Format::SpheresCsv => {
-            return Err(Fault::whole("is not read yet").into());
-        }
+        Format::Cif => Content::Molecule(mmcif::read(source, warnings)?),
+        Format::Pqr => Content::Molecule(pqr::read(source, warnings)?),
+        Format::Xyzr => Content::Molecule(xyzr::read(source, warnings)?),
+        Format::SpheresCsv => Content::Molecule(xyzr::read_csv(source, warnings)?),
         Format::Json => Content::Report(json::read(source, warnings)?),
         Format::Vdb => return Err(Fault::whole("vdb files are written, not read").into()),
     };
@@ -264,13 +268,60 @@ pub fn write_molecule(
 ) -> Result<(Vec<Output>, Vec<Warning>)> {
     let writer: fn(&Molecule, &mut dyn Write) -> std::io::Result<()> = match format {
         Format::Pdb => pdb::write,
+        Format::Cif => mmcif::write,
+        Format::Xyzr => xyzr::write,
+        Format::SpheresCsv => xyzr::write_csv,
         _ => return Err(cannot_hold(format, Kind::Molecule)),
     };
     if let Some(problem) = pdb::refusal(molecule).filter(|_| format == Format::Pdb) {
         return Err(Error::parameter("output-format", format.name(), problem));
     }
     let output = sink.write(format, |out| writer(molecule, out))?;
-    Ok((vec![output], Vec::new()))
+    Ok((vec![output], dropped_of_molecule(molecule, format)))
+}
+
+/// What of a molecule a format leaves out.
+fn dropped_of_molecule(molecule: &Molecule, format: Format) -> Vec<Warning> {
+    let mut lost = Vec::new();
+    let mut note = |code: &str, message: String, count: u64| {
+        if count > 0 {
+            lost.push(Warning::new(code, message, count, None));
+        }
+    };
+    match format {
+        Format::Pdb => {
+            let [places, radii] = pdb::rounded(molecule);
+            let message = "pdb files hold coordinates to 0.001; rounded".to_owned();
+            note("rounded-coordinates", message, places);
+            let message = "pdb files hold radii to 0.01; rounded".to_owned();
+            note("rounded-radii", message, radii);
+        }
+        Format::Xyzr | Format::SpheresCsv => {
+            let name = format.name();
+            let models = molecule.models.len().saturating_sub(1) as u64;
+            note(
+                "dropped-models",
+                format!("{name} files hold one model; left out"),
+                models,
+            );
+            let first = molecule
+                .models
+                .first()
+                .map_or(0..0, |model| model.atoms.clone());
+            let atoms = molecule.atoms_in(&first);
+            let named = atoms.iter().filter(|atom| !atom.name.is_empty()).count() as u64;
+            note(
+                "dropped-names",
+                format!("{name} files hold no names of atoms; left out"),
+                named,
+            );
+            let sized = atoms.iter().filter(|atom| atom.radius.is_none()).count() as u64;
+            let message = "atoms have no radius of their own; that of their element is written";
+            note("radii-of-elements", message.to_owned(), sized);
+        }
+        _ => {}
+    }
+    lost
 }
 
 /// Writes a volume. MHD writes two files: the header and, beside it, the data.

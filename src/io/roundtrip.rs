@@ -1,7 +1,9 @@
-//! Meshes made at random, for the tests that read back what they wrote.
+//! Meshes and molecules made at random, for the tests that read back what they wrote.
 
 use crate::mesh::polygon::set_faces;
 use crate::mesh::{Mesh, Polygons};
+use crate::protein::builder::{Builder, Place};
+use crate::protein::{Atom, Element, Molecule, Name};
 use crate::report::Warning;
 use proptest::prelude::*;
 
@@ -121,4 +123,62 @@ fn assembled(
 /// Faces made at random cross themselves; nothing else is to be warned of.
 pub fn only_about_faces(warnings: &[Warning]) -> bool {
     warnings.iter().all(|w| w.code == "fanned-faces")
+}
+
+/// A word of a few printable characters without blanks.
+fn word(least: usize, most: usize) -> impl Strategy<Value = Name> {
+    prop::collection::vec(b'!'..=b'~', least..=most)
+        .prop_map(|bytes| Name::new(&bytes).expect("a short word"))
+}
+
+/// An atom as a reader gives it, of a residue held as `hetero`.
+fn atom(hetero: bool) -> impl Strategy<Value = Atom> {
+    let thousandths = prop::array::uniform3(-999_999..9_999_999i32);
+    let figures = (0..=100i32, 0..=99_999i32, 1..=118u8, -9999..87_440_032i64);
+    let letter = prop_oneof![Just(b' '), b'A'..=b'Z'];
+    (thousandths, figures, word(1, 4), letter).prop_map(move |(at, figures, name, altloc)| {
+        let (occupancy, b_factor, element, serial) = figures;
+        Atom {
+            position: at.map(|c| f64::from(c) / 1000.0),
+            serial,
+            name,
+            occupancy: (f64::from(occupancy) / 100.0) as f32,
+            b_factor: (f64::from(b_factor) / 100.0) as f32,
+            element: Element(element),
+            altloc,
+            hetero,
+            ..super::gather::BLANK
+        }
+    })
+}
+
+/// A molecule that PDB files hold as it is.
+pub fn molecule() -> impl Strategy<Value = Molecule> {
+    let place = (word(1, 3), word(0, 1), -999..2_436_112i32, any::<bool>());
+    let letter = prop_oneof![Just(b' '), b'A'..=b'Z'];
+    let residue = (place, letter, any::<bool>()).prop_flat_map(|(place, insertion, hetero)| {
+        let (name, chain, number, in_polymer) = place;
+        let place = Place {
+            name,
+            chain,
+            number,
+            insertion,
+            in_polymer: in_polymer && hetero,
+        };
+        (Just(place), prop::collection::vec(atom(hetero), 1..4))
+    });
+    let models = prop::collection::vec(prop::collection::vec(residue, 1..6), 1..4);
+    models.prop_map(|models| {
+        let mut builder = Builder::default();
+        for (number, residues) in (1..).zip(models) {
+            builder.begin_model(number);
+            for (place, atoms) in residues {
+                for atom in atoms {
+                    builder.push(&place, atom).expect("room");
+                }
+            }
+        }
+        builder.set_id("1ABC".to_owned());
+        builder.finish()
+    })
 }

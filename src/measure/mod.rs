@@ -4,6 +4,7 @@ mod hausdorff;
 pub mod image_difference;
 pub mod mesh_distance;
 pub mod normal_error;
+pub mod passage;
 pub mod report_difference;
 mod sides;
 pub mod smooth_error;

@@ -6,6 +6,8 @@
 //! ([`super::hybrid36`]), or go over into the blank column beside theirs. Source: wwPDB, Protein Data
 //! Bank Contents Guide 3.3, 2012.
 
+#[cfg(test)]
+mod tests;
 mod write;
 
 pub use write::{refusal, rounded, write};
@@ -13,7 +15,7 @@ pub use write::{refusal, rounded, write};
 use super::gather::{BLANK, Gathered, name, single};
 use super::hybrid36;
 use super::refusal::Refusal;
-use super::text::{Lines, number, shown};
+use super::text::{Lines, number, shown, words};
 use crate::error::Fault;
 use crate::io::source::Source;
 use crate::protein::builder::Place;
@@ -136,7 +138,7 @@ impl Reader {
             b"TER" => builder.end_residue(),
             b"ENDMDL" | b"END" => self.has_ended = true,
             b"MODEL" => {
-                let word = columns(line, 7, 80).trim_ascii();
+                let word = words(columns(line, 7, 80)).next().unwrap_or_default();
                 let next = builder.model().map_or(1, |model| model.saturating_add(1));
                 let model = if word.is_empty() {
                     next

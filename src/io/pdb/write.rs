@@ -3,6 +3,7 @@
 use crate::error::number;
 use crate::io::hybrid36;
 use crate::protein::{Atom, Molecule, Name, Residue};
+use std::collections::BTreeSet;
 use std::io::{self, Write};
 
 /// Why a molecule does not fit the columns, if it does not: which atom, and which of its figures.
@@ -103,15 +104,52 @@ fn fixed(value: f64, width: usize, decimals: usize, least: usize) -> Option<Stri
     })
 }
 
+/// Writes the records `MODRES` of residues that are held as `HETATM` but stand in a polymer.
+fn write_modified(text: &mut Vec<u8>, molecule: &Molecule) -> io::Result<()> {
+    let mut written = BTreeSet::new();
+    for residue in molecule
+        .residues
+        .iter()
+        .filter(|residue| residue.in_polymer)
+    {
+        let key = (
+            residue.name,
+            residue.chain,
+            residue.number,
+            residue.insertion,
+        );
+        let is_hetero = molecule.atoms_in(&residue.atoms)[0].hetero;
+        let is_short = residue.name.as_bytes().len() <= 3;
+        if is_hetero && is_short && written.insert(key) {
+            let number = hybrid36::write(i64::from(residue.number), 4).ok_or_else(no_room)?;
+            let (name, chain) = (residue.name, residue.chain);
+            let insertion = char::from(residue.insertion);
+            let id = if has_id(molecule) { &molecule.id } else { "" };
+            writeln!(
+                text,
+                "{:<80}",
+                format!("MODRES {id:4} {name:>3} {chain:1} {number:>4}{insertion}")
+            )?;
+        }
+    }
+    Ok(())
+}
+
+/// Whether the entry's name fits its columns.
+fn has_id(molecule: &Molecule) -> bool {
+    molecule.id.len() == 4 && molecule.id.bytes().all(|b| b.is_ascii_alphanumeric())
+}
+
 /// Writes atoms and models; of several models each between `MODEL` and `ENDMDL`.
 ///
 /// Chains end with `TER`. Where an atom has a radius of its own that stands in place of the temperature
 /// factor. A molecule that [`refusal`] has something against is an error of the writer. Cost: linear.
 pub fn write(molecule: &Molecule, out: &mut dyn Write) -> io::Result<()> {
     let mut text = Vec::new();
-    if molecule.id.len() == 4 && molecule.id.bytes().all(|b| b.is_ascii_alphanumeric()) {
+    if has_id(molecule) {
         writeln!(text, "{:<62}{:<18}", "HEADER", molecule.id)?;
     }
+    write_modified(&mut text, molecule)?;
     let has_models = molecule.models.len() > 1 || molecule.models.iter().any(|m| m.number != 1);
     for (index, model) in molecule.models.iter().enumerate() {
         if has_models {

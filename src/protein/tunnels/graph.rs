@@ -110,6 +110,14 @@ impl<'a> Graph<'a> {
         self.evaluated
     }
 
+    /// Bytes that it takes.
+    pub fn bytes(&self) -> u64 {
+        let cells = self.triangulation.cells().len();
+        let points = self.triangulation.points().len();
+        let of_cell = size_of::<Cell>() + size_of::<Node>() + size_of::<[f64; 4]>();
+        (cells * of_cell + points * (size_of::<[f64; 4]>() + 2 * size_of::<u32>())) as u64
+    }
+
     /// A cell of the triangulation.
     #[inline]
     pub fn cell(&self, cell: u32) -> Cell {

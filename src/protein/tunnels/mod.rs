@@ -28,6 +28,7 @@ pub mod search;
 pub mod shape;
 mod solid;
 mod start;
+mod trade;
 pub mod tunnel;
 
 #[cfg(test)]
@@ -37,6 +38,7 @@ pub use balls::COUNTS;
 pub use params::{Exit, Method, Params, Removal};
 pub use search::{Extent, Prefer};
 pub use start::Start;
+pub use trade::TRADE;
 pub use tunnel::{LINING, Narrowest, Stop, Tunnel};
 
 use crate::error::{Error, Fault, Result};
@@ -88,6 +90,10 @@ pub struct Searched {
     pub outside: u64,
     /// Triangulations made.
     pub triangulations: u64,
+    /// Atoms that were triangulated.
+    pub atoms: u64,
+    /// Bytes of the largest graph.
+    pub bytes: u64,
 }
 
 /// Finds the tunnels out of a molecule from `given`.
@@ -149,6 +155,8 @@ impl<'a> Search<'a> {
         let mut searched = Searched {
             cells: graph.triangulation.finite_cells() as u64,
             triangulations: 1,
+            atoms: self.balls.len() as u64,
+            bytes: graph.bytes(),
             ..Searched::default()
         };
         if searched.cells == 0 {

@@ -2,6 +2,7 @@
 
 use super::graph::Graph;
 use crate::numeric::vector::{length, sub};
+use crate::trade::named;
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;
 
@@ -92,6 +93,7 @@ pub enum Extent {
     /// All cells that can be reached.
     Full,
 }
+named! { Extent { Reduced = "reduced", Full = "full" } }
 
 /// A way from the start to the outside, as the gates it goes through.
 #[derive(Debug, Clone, PartialEq)]
@@ -210,7 +212,7 @@ pub enum Prefer {
     /// The integral of `1 / r^2` along it: wide ways at little more length.
     Cost,
 }
-crate::trade::named! { Prefer { Length = "length", Cost = "cost" } }
+named! { Prefer { Length = "length", Cost = "cost" } }
 
 /// The cheapest way from `start` to the outside through gates of at least `width`.
 ///

@@ -1,0 +1,379 @@
+//! `scantle tunnels`: the widest ways from inside a molecule to the outside.
+
+mod result;
+
+use crate::context::{Context, Files};
+use crate::exit::Exit;
+use crate::job::{Found, Job};
+use crate::shared::{Common, Inputs, MaxError, Output, Verify, named, not_negative, positive};
+use clap::{ArgGroup, value_parser};
+use result::{Solved, Stats};
+use scantle::error::{At, Error, Result};
+use scantle::io::format::Kind;
+use scantle::io::source::Source;
+use scantle::protein::Molecule;
+use scantle::protein::radii::Radii;
+use scantle::protein::select::{SelectParams, Selected, SelectionCounts};
+use scantle::protein::start::Start;
+use scantle::protein::tunnels::{Exit as WayOut, Extent, Method, Params, Prefer, Removal, find};
+use scantle::report::{Accuracy, Measures, Modelled};
+use schemars::JsonSchema;
+use serde::Serialize;
+
+/// Find the widest ways from inside a molecule to the outside, with a proof
+///
+/// Atoms are balls; a tunnel is a curve from the start to the outside, as wide as the largest ball that
+/// passes along it. The narrowest place of the widest tunnel lies on a Voronoi diagram of the atoms, and
+/// ways are searched on the dual of a Delaunay triangulation. `bottleneck` says what is certain: a way of
+/// width `lower` was found, and none is wider than `upper`.
+#[derive(Debug, clap::Args)]
+#[command(after_long_help = AFTER, group = ArgGroup::new("from").required(true))]
+pub struct Args {
+    #[command(flatten)]
+    inputs: Inputs,
+    /// Start at this point
+    #[arg(long, value_name = "X,Y,Z", group = "from", value_parser = Start::point, allow_hyphen_values = true)]
+    start: Option<Start>,
+    /// Start in the middle of these residues, such as A:106,A:272
+    #[arg(long, value_name = "RESIDUE,...", group = "from", value_parser = Start::residues)]
+    start_residues: Option<Start>,
+    /// Start in the middle of the atoms with these serial numbers
+    #[arg(long, value_name = "SERIAL,...", group = "from", value_parser = Start::atoms, allow_hyphen_values = true)]
+    start_atoms: Option<Start>,
+    /// Start in the middle of this ligand, such as HEM or HEM:A:401, which is left out
+    #[arg(long, value_name = "NAME", group = "from", value_parser = Start::ligand)]
+    start_ligand: Option<Start>,
+    /// Look for the widest place to start within this distance; 0 holds the start
+    #[arg(long, value_name = "R", default_value_t = Params::DEFAULT.start_search, value_parser = not_negative)]
+    start_search: f64,
+    /// How widths are found: `conservative`, all atoms as large as the largest; `approximate`, gates by
+    /// the ball that touches three atoms; `balls:K`, atoms as K + 1 balls (4, 6, 8, 12, 20); `grid:H`,
+    /// over the points of a grid; `exact`, between bounds as close as --tolerance
+    #[arg(long, default_value = "approximate", value_parser = method)]
+    method: Method,
+    /// Where ways end: `shell`, in the solvent, where a probe of --shell-radius comes from outside;
+    /// `hull`, behind the convex hull
+    #[arg(long, default_value = Params::DEFAULT.exit.name(), value_parser = named(WayOut::NAMES, WayOut::from_name))]
+    exit: WayOut,
+    /// Radius of the probe that tells the solvent from the molecule
+    #[arg(long, value_name = "R", default_value_t = Params::DEFAULT.shell_radius, value_parser = positive)]
+    shell_radius: f64,
+    /// Find no tunnels narrower than this
+    #[arg(long, value_name = "R", default_value_t = Params::DEFAULT.probe_radius, value_parser = not_negative)]
+    probe_radius: f64,
+    /// Find so many tunnels at most
+    #[arg(long, value_name = "N", default_value_t = Params::DEFAULT.count as u32, value_parser = value_parser!(u32).range(1..=10_000))]
+    count: u32,
+    /// What is closed before the next tunnel is looked for: `a`, the narrowest gates; `b`, all from the
+    /// narrowest to the surface; `c`, the narrowest and those around
+    #[arg(long, default_value = Params::DEFAULT.removal.name(), value_parser = named(Removal::NAMES, Removal::from_name))]
+    remove: Removal,
+    /// Tunnels that end so near one another have one mouth, of which the widest is kept
+    #[arg(long, value_name = "R", default_value_t = Params::DEFAULT.mouth, value_parser = not_negative)]
+    mouth: f64,
+    /// Of ways that are as wide, take the one of least `length`, or of least `cost`, the integral of
+    /// 1 / r^2
+    #[arg(long, default_value = Params::DEFAULT.prefer.name(), value_parser = named(Prefer::NAMES, Prefer::from_name))]
+    prefer: Prefer,
+    /// How much a search looks at: `reduced`, until it is outside; `full`, everything
+    #[arg(long, default_value = Params::DEFAULT.extent.name(), value_parser = named(Extent::NAMES, Extent::from_name))]
+    search: Extent,
+    /// How far the bounds of the exact method may be apart
+    #[arg(long, value_name = "X", default_value_t = Params::DEFAULT.tolerance, value_parser = positive)]
+    tolerance: f64,
+    /// Largest distance between spheres on a tunnel
+    #[arg(long, value_name = "X", default_value_t = Params::DEFAULT.step, value_parser = positive)]
+    step: f64,
+    /// Count these residues in though they are no protein or nucleic acid, such as HEM,ZN
+    #[arg(long, value_name = "NAME,...", value_delimiter = ',')]
+    keep: Vec<String>,
+    /// A table of radii: lines of ELEMENT RADIUS or RESIDUE ATOM RADIUS
+    #[arg(long, value_name = "FILE")]
+    radii: Option<String>,
+    /// Which models of a file: `first`, `all`, or one by its number
+    #[arg(long, default_value = "first", value_parser = models)]
+    models: Models,
+    #[command(flatten)]
+    output: Output,
+    #[command(flatten)]
+    max_error: MaxError,
+    #[command(flatten)]
+    verify: Verify,
+    #[command(flatten)]
+    common: Common,
+}
+
+const AFTER: &str = "\
+Lengths are in the unit of the coordinates, angstrom as a rule. The output holds the spheres along the
+tunnels, their radius in the column of the temperature factor.
+
+Examples:
+  scantle tunnels fixtures/molecules/porthole.xyzr --start 0,0,0
+  scantle tunnels fixtures/molecules/porthole.xyzr --start 0,0,0 --method exact -o tunnels.pdb
+";
+
+/// Which models.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Models {
+    First,
+    All,
+    Numbered(i32),
+}
+
+fn models(text: &str) -> Result<Models, String> {
+    match text {
+        "first" => Ok(Models::First),
+        "all" => Ok(Models::All),
+        number => {
+            let number = number.parse().map(Models::Numbered);
+            number.map_err(|_| "neither `first`, `all` nor the number of a model".to_owned())
+        }
+    }
+}
+
+fn method(name: &str) -> Result<Method, String> {
+    Method::from_name(name).ok_or_else(|| {
+        "is none of conservative, approximate, balls:4, balls:6, balls:8, balls:12, balls:20, grid:H \
+         with a spacing H above 0, exact"
+            .to_owned()
+    })
+}
+
+/// What was asked for.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct Asked {
+    /// The start, in the words of its option.
+    start: String,
+    /// The option that it was given with.
+    start_option: String,
+    /// How far from it a wider place was looked for.
+    start_search: f64,
+    /// How widths were found.
+    method: String,
+    /// Where ways end.
+    exit: String,
+    /// Radius of the probe that tells the solvent from the molecule; null where ways end at the hull.
+    shell_radius: Option<f64>,
+    /// Tunnels narrower than this were not looked for.
+    probe_radius: f64,
+    /// Tunnels at most.
+    count: u32,
+    /// What was closed before the next tunnel was looked for.
+    remove: String,
+    /// Tunnels that end so near one another have one mouth.
+    mouth: f64,
+    /// What decides between ways that are as wide.
+    prefer: String,
+    /// How much searches look at.
+    search: String,
+    /// How far the bounds may be apart; null but for the exact method.
+    tolerance: Option<f64>,
+    /// Largest distance between spheres on a tunnel.
+    step: f64,
+    /// Residues that count though they are no polymer.
+    keep: Vec<String>,
+    /// The table of radii.
+    radii: Option<String>,
+    /// Which models.
+    models: String,
+}
+
+/// The report of this command.
+pub type Report = scantle::report::Report<Asked, Stats>;
+
+impl Args {
+    fn from(&self) -> &Start {
+        let given = [
+            &self.start,
+            &self.start_residues,
+            &self.start_atoms,
+            &self.start_ligand,
+        ];
+        let given = given.into_iter().flatten().next();
+        given.expect("the parser asks for one")
+    }
+
+    fn params(&self, memory: u64) -> Params {
+        Params {
+            method: self.method,
+            exit: self.exit,
+            start_search: self.start_search,
+            probe_radius: self.probe_radius,
+            shell_radius: self.shell_radius,
+            mouth: self.mouth,
+            count: self.count as usize,
+            removal: self.remove,
+            prefer: self.prefer,
+            extent: self.search,
+            tolerance: self.tolerance,
+            step: self.step,
+            memory,
+        }
+    }
+
+    fn asked(&self) -> Asked {
+        let start = self.from();
+        Asked {
+            start: start.to_string(),
+            start_option: start.option().to_owned(),
+            start_search: self.start_search,
+            method: self.method.name(),
+            exit: self.exit.name().to_owned(),
+            shell_radius: (self.exit == WayOut::Shell).then_some(self.shell_radius),
+            probe_radius: self.probe_radius,
+            count: self.count,
+            remove: self.remove.name().to_owned(),
+            mouth: self.mouth,
+            prefer: self.prefer.name().to_owned(),
+            search: self.search.name().to_owned(),
+            tolerance: (self.method == Method::Exact).then_some(self.tolerance),
+            step: self.step,
+            keep: self.keep.clone(),
+            radii: self.radii.clone(),
+            models: match self.models {
+                Models::First => "first".to_owned(),
+                Models::All => "all".to_owned(),
+                Models::Numbered(number) => number.to_string(),
+            },
+        }
+    }
+}
+
+/// Finds the tunnels of each input.
+pub fn run(args: &Args) -> Result<Exit> {
+    let context = Context::new(&args.common)?;
+    let params = args.params(context.memory());
+    params.check()?;
+    let radii = match &args.radii {
+        None => Radii::default(),
+        Some(word) => {
+            let source = Source::open(word, context.memory())?;
+            let text = String::from_utf8_lossy(source.bytes()).into_owned();
+            Radii::read(&text).map_err(|fault| Error::Malformed {
+                path: word.into(),
+                fault,
+            })?
+        }
+    };
+    let files = Files::each(&args.inputs).output(&args.output);
+    context.run("tunnels", &files, |job| tunnels(job, &params, args, &radii))
+}
+
+/// One model's atoms that count, and what was found between them.
+pub(crate) struct Model {
+    number: i32,
+    selected: Selected,
+    found: scantle::protein::tunnels::Tunnels,
+}
+
+fn tunnels(
+    job: &mut Job,
+    params: &Params,
+    args: &Args,
+    radii: &Radii,
+) -> Result<Found<Asked, Stats>> {
+    job.expect_output(&[Kind::Molecule])?;
+    let molecule = job.read_molecule()?;
+    let mut solved: Vec<Solved> = Vec::new();
+    let mut first: Option<Model> = None;
+    for index in chosen(&molecule, args.models)? {
+        let model = solve(job, &molecule, index, params, args, radii)?;
+        solved.push(Solved::new(&molecule, &model));
+        first.get_or_insert(model);
+    }
+    let Some(model) = first else {
+        unreachable!("at least one model is chosen");
+    };
+    job.warn(model.selected.warnings());
+    job.warn(result::warnings(&model.found, params));
+    let summary = result::summary(&model);
+    let accuracy = accuracy(&model);
+    let counts: &SelectionCounts = &model.selected.counts;
+    let searched = model.found.searched;
+    let made = Modelled::new("atom", searched.atoms, counts.atoms_used, searched.bytes);
+    let mut found = solved.into_iter();
+    let own = found.next().expect("at least one model is chosen");
+    let others: Vec<Solved> = found.collect();
+    let models = (args.models == Models::All).then_some(others);
+    let stats = Stats {
+        own,
+        other_models: models,
+    };
+    let found = Found::new(args.asked(), stats, summary).modelled(made);
+    Ok(found
+        .accuracy(accuracy)
+        .check("max-error", args.max_error.max_error))
+}
+
+/// Indices of the models that were asked for.
+fn chosen(molecule: &Molecule, models: Models) -> Result<Vec<usize>> {
+    match models {
+        Models::First => Ok(vec![0]),
+        Models::All => Ok((0..molecule.models.len()).collect()),
+        Models::Numbered(number) => {
+            let numbers = || molecule.models.iter().map(|model| model.number);
+            let at = numbers().position(|other| other == number);
+            at.map(|at| vec![at]).ok_or_else(|| {
+                let there: Vec<String> = numbers().map(|n| n.to_string()).collect();
+                let problem = format!("is not there: the models are {}", there.join(", "));
+                Error::parameter("models", number, problem)
+            })
+        }
+    }
+}
+
+fn solve(
+    job: &Job,
+    molecule: &Molecule,
+    index: usize,
+    params: &Params,
+    args: &Args,
+    radii: &Radii,
+) -> Result<Model> {
+    let start = args.from().resolve(molecule, index)?;
+    let select = SelectParams {
+        keep: args.keep.clone(),
+        drop: start.drop,
+        radii: radii.clone(),
+    };
+    let selected = Selected::of(molecule, index, &select)?;
+    let found = find(&selected.balls, start.position, params, job.progress());
+    let found = found.map_err(|error| named_atom(error, molecule, &selected))?;
+    Ok(Model {
+        number: molecule.models[index].number,
+        selected,
+        found,
+    })
+}
+
+/// An error about one of the balls as one about an atom of the file.
+fn named_atom(error: Error, molecule: &Molecule, selected: &Selected) -> Error {
+    match error {
+        Error::Geometry(mut fault) => {
+            if let At::Element("atom", ball) = fault.at {
+                let index = selected.atoms[ball as usize];
+                let atom = &molecule.atoms[index as usize];
+                let residue = molecule.residue_of(atom);
+                fault.at = At::Element("atom", u64::from(index));
+                fault.problem += &format!(
+                    ": {} of {} {residue}, serial {}",
+                    atom.name, residue.name, atom.serial
+                );
+            }
+            Error::Geometry(fault)
+        }
+        other => other,
+    }
+}
+
+fn accuracy(model: &Model) -> Measures {
+    let widest = model.found.widest.as_ref();
+    Measures::One(Accuracy {
+        measure: "width of the widest way above that of the one found".to_owned(),
+        unit: "angstrom".to_owned(),
+        bound: widest.map(|w| (w.upper - w.narrowest.radius).max(0.0)),
+        reached: None,
+        reference: "no way is wider than the upper bound".to_owned(),
+        verified: false,
+    })
+}
