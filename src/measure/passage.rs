@@ -63,7 +63,10 @@ pub fn passage(
     progress: &dyn Progress,
 ) -> Result<Passage> {
     let mut tree = Tree::new(balls, start);
-    let clear = balls.iter().map(|ball| ball.distance(start)).fold(f64::INFINITY, f64::min);
+    let clear = balls
+        .iter()
+        .map(|ball| ball.distance(start))
+        .fold(f64::INFINITY, f64::min);
     let (mut lower, mut rounds) = (f64::NEG_INFINITY, 0);
     loop {
         rounds += 1;
@@ -73,12 +76,22 @@ pub fn passage(
         lower = least.fold(clear, f64::min).max(lower);
         let cells = tree.cells.len() as u64;
         if upper - lower <= tolerance {
-            return Ok(Passage { lower, upper, cells, rounds });
+            return Ok(Passage {
+                lower,
+                upper,
+                cells,
+                rounds,
+            });
         }
         if cells * BYTES > memory {
             let what = format!("an octree of {cells} cells around the way out");
             let needed = u128::from(cells * BYTES);
-            return Err(Error::over_memory(what, needed, memory, Some("raise --max-memory")));
+            return Err(Error::over_memory(
+                what,
+                needed,
+                memory,
+                Some("raise --max-memory"),
+            ));
         }
         let before = tree.cells.len();
         let coarse = (f64::from(tree.cells[0].size) * COARSE) as u32;
@@ -95,7 +108,12 @@ pub fn passage(
         }
         if tree.cells.len() == before {
             // No cell can be split any more: rounding keeps the bounds apart.
-            return Ok(Passage { lower, upper, cells, rounds });
+            return Ok(Passage {
+                lower,
+                upper,
+                cells,
+                rounds,
+            });
         }
     }
 }
@@ -110,14 +128,21 @@ impl<'a> Tree<'a> {
                 high[axis] = high[axis].max(ball.centre[axis] + ball.radius);
             }
         }
-        let extent = (0..3).map(|axis| high[axis] - low[axis]).fold(0.0, f64::max);
+        let extent = (0..3)
+            .map(|axis| high[axis] - low[axis])
+            .fold(0.0, f64::max);
         let size = 1 << LEVELS;
         // A little wider than the balls, so that the start is inside.
         let unit = extent * 1.01 / f64::from(size);
         let low = std::array::from_fn(|axis| {
             0.5 * (low[axis] + high[axis]) - 0.5 * unit * f64::from(size)
         });
-        let mut tree = Tree { balls, cells: vec![], low, unit };
+        let mut tree = Tree {
+            balls,
+            cells: vec![],
+            low,
+            unit,
+        };
         let all: Vec<u32> = (0..balls.len() as u32).collect();
         let root = tree.cell([0; 3], size, &all);
         tree.cells.push(root);
@@ -138,7 +163,10 @@ impl<'a> Tree<'a> {
                 least += out * out;
                 most += far * far;
             }
-            (f64::sqrt(least) - ball.radius, f64::sqrt(most) - ball.radius)
+            (
+                f64::sqrt(least) - ball.radius,
+                f64::sqrt(most) - ball.radius,
+            )
         };
         for ball in near {
             let (least, most) = bounds(&self.balls[*ball as usize]);
@@ -176,12 +204,21 @@ impl<'a> Tree<'a> {
     fn leaf_at(&self, p: [f64; 3]) -> u32 {
         let most = f64::from(self.cells[0].size) - 1.0;
         let place: [u32; 3] = std::array::from_fn(|axis| {
-            ((p[axis] - self.low[axis]) / self.unit).floor().clamp(0.0, most) as u32
+            ((p[axis] - self.low[axis]) / self.unit)
+                .floor()
+                .clamp(0.0, most) as u32
         });
         let mut at = 0;
         while self.cells[at as usize].parts != 0 {
-            let Cell { corner, size, parts, .. } = &self.cells[at as usize];
-            let part: u32 = (0..3).map(|k| u32::from(place[k] - corner[k] >= size / 2) << k).sum();
+            let Cell {
+                corner,
+                size,
+                parts,
+                ..
+            } = &self.cells[at as usize];
+            let part: u32 = (0..3)
+                .map(|k| u32::from(place[k] - corner[k] >= size / 2) << k)
+                .sum();
             at = parts + part;
         }
         at
@@ -191,7 +228,11 @@ impl<'a> Tree<'a> {
     /// that face is one of the root's.
     fn beyond(&self, cell: u32, axis: usize, above: bool, found: &mut Vec<u32>) -> bool {
         let Cell { corner, size, .. } = self.cells[cell as usize];
-        let plane = if above { corner[axis] + size } else { corner[axis] };
+        let plane = if above {
+            corner[axis] + size
+        } else {
+            corner[axis]
+        };
         if plane == 0 || plane == self.cells[0].size {
             return true;
         }
@@ -240,7 +281,10 @@ impl<'a> Tree<'a> {
                     // The first to reach a leaf is the widest to do so.
                     if from[*other as usize] == u32::MAX {
                         from[*other as usize] = cell;
-                        queue.push(Waiting(width.min(self.cells[*other as usize].upper), *other));
+                        queue.push(Waiting(
+                            width.min(self.cells[*other as usize].upper),
+                            *other,
+                        ));
                     }
                 }
             }
@@ -291,7 +335,10 @@ mod tests {
         assert!(found.upper - found.lower <= 1e-4);
         // Held by the start: no way is wider than where it begins.
         let found = known(&balls, [12.0, 12.0, 14.0], 1e-4);
-        assert!((found.lower - 0.3).abs() < 1e-4 && (found.upper - 0.3).abs() < 1e-4, "{found:?}");
+        assert!(
+            (found.lower - 0.3).abs() < 1e-4 && (found.upper - 0.3).abs() < 1e-4,
+            "{found:?}"
+        );
     }
 
     #[test]
@@ -303,7 +350,10 @@ mod tests {
             let mut balls: Vec<Ball> = Vec::new();
             while balls.len() < 120 {
                 let centre = [0, 1, 2].map(|_| rng.range(-8.0, 8.0));
-                let made = Ball { centre, radius: radii[rng.below(if seed < 25 { 5 } else { 1 })] };
+                let made = Ball {
+                    centre,
+                    radius: radii[rng.below(if seed < 25 { 5 } else { 1 })],
+                };
                 let is_free = made.distance([0.0; 3]) > 1.5 && length(centre) < 8.0;
                 if is_free && balls.iter().all(|b| length(sub(b.centre, centre)) > 1.6) {
                     balls.push(made);
@@ -320,16 +370,25 @@ mod tests {
             let exact = find(&balls, [0.0; 3], &params, &Silent).expect("a start inside");
             let exact = exact.widest.expect("a way");
             let found = known(&balls, [0.0; 3], 1e-3);
-            assert!(found.lower <= exact.upper && exact.lower <= found.upper, "{seed}: {found:?} {exact:?}");
+            assert!(
+                found.lower <= exact.upper && exact.lower <= found.upper,
+                "{seed}: {found:?} {exact:?}"
+            );
             assert!(found.upper - found.lower <= 1e-3, "{seed}");
             narrow += usize::from(exact.lower < 1.5);
         }
-        assert!(narrow > 25, "{narrow}: most should have a gate narrower than the start");
+        assert!(
+            narrow > 25,
+            "{narrow}: most should have a gate narrower than the start"
+        );
     }
 
     #[test]
     fn the_limit_holds() {
-        let ball = |x: f64| Ball { centre: [x, 0.0, 0.0], radius: 1.0 };
+        let ball = |x: f64| Ball {
+            centre: [x, 0.0, 0.0],
+            radius: 1.0,
+        };
         let error = passage(&[ball(-2.0), ball(2.0)], [0.0; 3], 1e-9, 1000, &Silent);
         assert!(matches!(error, Err(Error::Limit { .. })));
     }

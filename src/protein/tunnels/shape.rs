@@ -107,7 +107,7 @@ pub(super) fn tube(tunnel: &Tunnel, clearance: &Clearance) -> Vec<Ball> {
 }
 
 /// Over how much of a surface balls along a line spread at most: their own, and the sides between them.
-fn area(balls: &[Ball]) -> f64 {
+pub(super) fn area(balls: &[Ball]) -> f64 {
     use std::f64::consts::PI;
     let ends = [balls.first(), balls.last()].into_iter().flatten();
     let caps: f64 = ends.map(|ball| 2.0 * PI * ball.radius * ball.radius).sum();
@@ -185,7 +185,7 @@ pub fn surface(
 }
 
 /// The surface of balls together.
-fn union(balls: &[Ball], lattice: &Lattice, progress: &dyn Progress) -> Result<Mesh> {
+pub(super) fn union(balls: &[Ball], lattice: &Lattice, progress: &dyn Progress) -> Result<Mesh> {
     let near = Clearance::new(balls);
     // The first ball found to hold a point tells that it is inside.
     let inside = lattice.select(|p| near.between(p, 0.0, f64::INFINITY) <= 0.0);
