@@ -71,7 +71,8 @@ const MOLECULES: &[Row<Molecule>] = &[
 /// An atom as a molecule has it: its place and name in a residue, an element and a letter.
 fn atom(position: [f64; 3], name: &str, symbol: &str, hetero: bool) -> Atom {
     Atom {
-        position: position.map(|c| (c * 1000.0).round() / 1000.0),
+        // Adding 0 takes the sign of a zero away.
+        position: position.map(|c| (c * 1000.0).round() / 1000.0 + 0.0),
         radius: None,
         serial: 0,
         name: Name::new(name.as_bytes()).expect("a name"),
@@ -104,9 +105,9 @@ const OF_A_HELIX: [(&str, [f64; 3]); 5] = [
     ("CB", [3.29, -18.0, 0.77]),
 ];
 
-/// Two models of a helix of ten alanines, one of them selenomethionine's name, one with an insertion code,
-/// one a serine with its oxygen at two places and one at a place that it shares with a glycine; a zinc
-/// ion, a ring of carbons and three molecules of water, whose numbers go on in base 36.
+/// Two models of a helix of ten residues: alanines, one of them with an insertion code, a selenomethionine
+/// and a serine with its oxygen at two places; beside it a zinc ion, a ring of carbons and three molecules
+/// of water. Serial and residue numbers go on in hybrid-36.
 fn helix_of_atoms() -> Molecule {
     let mut builder = Builder::default();
     builder.set_id("0HLX".to_owned());
@@ -182,7 +183,7 @@ fn ring_of_spheres() -> Molecule {
     for index in 0..8 {
         let (sin, cos) = (45.0 * f64::from(index)).to_radians().sin_cos();
         let sphere = Atom {
-            radius: Some(1.2 + f64::from(index) / 10.0),
+            radius: Some(f64::from(12 + index) / 10.0),
             serial: i64::from(index) + 1,
             ..atom([4.0 * cos, 4.0 * sin, 0.0], "", "", false)
         };

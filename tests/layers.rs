@@ -40,7 +40,8 @@ const MAY_USE: &[(&str, &[&str])] = &[
     (
         "measure",
         &[
-            "error", "image", "mesh", "numeric", "progress", "protein", "report", "spatial", "trade", "volume",
+            "error", "image", "mesh", "numeric", "progress", "protein", "report", "spatial",
+            "trade", "volume",
         ],
     ),
     // Data types only: a reader calls no algorithm.

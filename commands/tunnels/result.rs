@@ -1,6 +1,7 @@
 //! What the report says of tunnels.
 
 use super::Model;
+use scantle::measure::passage::Passage;
 use scantle::protein::select::SelectionCounts;
 use scantle::protein::tunnels::{Narrowest, Params, Stop, Tunnel, Tunnels, Widest};
 use scantle::protein::{Molecule, Residue};
@@ -14,9 +15,52 @@ pub struct Stats {
     /// The first model that was asked for.
     #[serde(flatten)]
     pub own: Solved,
+    /// The width of the widest way by other means, with `--verify`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub verified: Option<Verified>,
     /// The others, with `--models all`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub other_models: Option<Vec<Solved>>,
+}
+
+/// The width of the widest way, between two bounds each, by two means that share nothing.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct Verified {
+    /// By regular triangulations.
+    pub exact: [f64; 2],
+    /// By an octree.
+    pub octree: [f64; 2],
+    /// Its cells.
+    pub octree_cells: u64,
+}
+
+impl Verified {
+    /// What both say.
+    pub fn new(exact: &Widest, octree: &Passage) -> Self {
+        Verified {
+            exact: [exact.lower, exact.upper],
+            octree: [octree.lower, octree.upper],
+            octree_cells: octree.cells,
+        }
+    }
+
+    /// Whether both may be right.
+    pub fn agrees(&self) -> bool {
+        let room = 1e-9 * self.exact[1].abs();
+        self.octree[0] <= self.exact[1] + room && self.exact[0] <= self.octree[1] + room
+    }
+}
+
+/// A warning where the two do not agree.
+pub fn doubts(verified: Option<&Verified>) -> Vec<Warning> {
+    let wrong = verified.filter(|v| !v.agrees());
+    let warning = |v: &Verified| {
+        let [[a, b], [c, d]] = [v.exact, v.octree];
+        let message =
+            format!("the exact width, {a} to {b}, is not what the octree has, {c} to {d}");
+        Warning::new("references-disagree", message, 1, None)
+    };
+    wrong.map(warning).into_iter().collect()
 }
 
 /// What was found in one model.

@@ -249,12 +249,46 @@ pub fn triple<'a>(
 /// Appends the shortest decimal that reads back as the same number.
 pub fn push_number(text: &mut Vec<u8>, value: f64) {
     let size = value.abs();
+    let thousandths = (value * 1e3).round();
+    // Most numbers in files have few digits. Of up to 15 each decimal is read as another number, so
+    // that these are the shortest.
+    if value != 0.0 && size < 1e9 && thousandths / 1e3 == value {
+        push_decimal(text, thousandths as i64, 3);
+        let digits = text.iter().rev().take_while(|b| **b == b'0').count();
+        text.truncate(text.len() - digits);
+        if text.last() == Some(&b'.') {
+            text.pop();
+        }
+        return;
+    }
     // Writing into a vector does not fail.
     let _ = if size == 0.0 || (1e-5..1e16).contains(&size) {
         write!(text, "{value}")
     } else {
         write!(text, "{value:e}")
     };
+}
+
+/// Appends a number with so many decimals (at least one, at most 17), of which `value` is the last
+/// one's count.
+pub fn push_decimal(text: &mut Vec<u8>, value: i64, decimals: usize) {
+    let mut digits = [b'0'; 40];
+    let mut rest = value.unsigned_abs();
+    let mut at = digits.len();
+    let point = digits.len() - decimals - 1;
+    while rest > 0 || at > point - 1 {
+        at -= 1;
+        if at == point {
+            digits[at] = b'.';
+            continue;
+        }
+        digits[at] = b'0' + (rest % 10) as u8;
+        rest /= 10;
+    }
+    if value < 0 {
+        text.push(b'-');
+    }
+    text.extend_from_slice(&digits[at..]);
 }
 
 /// Hands on what was gathered, once it is worth a call.
@@ -322,6 +356,21 @@ mod tests {
         ) {
             let expected: Option<f64> = word.parse().ok();
             prop_assert_eq!(number(word.as_bytes()).map(f64::to_bits), expected.map(f64::to_bits));
+        }
+
+        #[test]
+        fn numbers_of_few_digits_are_written_as_by_the_standard_library(
+            thousandths in -1_000_000_000_000..1_000_000_000_000i64,
+            small in -2000..2000i64,
+        ) {
+            for count in [thousandths, small, small * 100] {
+                let value = count as f64 / 1000.0;
+                let [mut text, mut fixed] = [Vec::new(), Vec::new()];
+                push_number(&mut text, value);
+                push_decimal(&mut fixed, count, 3);
+                prop_assert_eq!(String::from_utf8(text).expect("text"), format!("{value}"));
+                prop_assert_eq!(String::from_utf8(fixed).expect("text"), format!("{value:.3}"));
+            }
         }
 
         #[test]

@@ -323,18 +323,22 @@ mod tests {
 
     #[test]
     fn a_lattice_has_the_gate_of_theory() {
-        let balls: Vec<Ball> = (0..125)
+        let balls: Vec<Ball> = (0..64)
             .map(|k| Ball {
-                centre: [k % 5, k / 5 % 5, k / 25].map(|c| 6.0 * f64::from(c)),
+                centre: [k % 4, k / 4 % 4, k / 16].map(|c| 6.0 * f64::from(c)),
                 radius: 1.7,
             })
             .collect();
         let truth = 6.0 / 2f64.sqrt() - 1.7;
-        let found = known(&balls, [15.0; 3], 1e-4);
+        let found = known(&balls, [9.0; 3], 0.02);
         assert!(found.lower <= truth && truth <= found.upper, "{found:?}");
-        assert!(found.upper - found.lower <= 1e-4);
+        assert!(found.upper - found.lower <= 0.02);
         // Held by the start: no way is wider than where it begins.
+<<<<<<< HEAD
         let found = known(&balls, [12.0, 12.0, 14.0], 1e-4);
+=======
+        let found = known(&balls, [6.0, 6.0, 8.0], 1e-4);
+>>>>>>> tunnels
         assert!(
             (found.lower - 0.3).abs() < 1e-4 && (found.upper - 0.3).abs() < 1e-4,
             "{found:?}"
@@ -345,9 +349,10 @@ mod tests {
     fn it_confirms_the_exact_method_on_random_balls() {
         let radii = [1.2, 1.52, 1.55, 1.7, 1.8];
         let mut narrow = 0;
-        for seed in 0..50 {
+        for seed in 0..12 {
             let mut rng = Rng::new(seed, 1);
             let mut balls: Vec<Ball> = Vec::new();
+<<<<<<< HEAD
             while balls.len() < 120 {
                 let centre = [0, 1, 2].map(|_| rng.range(-8.0, 8.0));
                 let made = Ball {
@@ -355,6 +360,15 @@ mod tests {
                     radius: radii[rng.below(if seed < 25 { 5 } else { 1 })],
                 };
                 let is_free = made.distance([0.0; 3]) > 1.5 && length(centre) < 8.0;
+=======
+            while balls.len() < 70 {
+                let centre = [0, 1, 2].map(|_| rng.range(-6.5, 6.5));
+                let made = Ball {
+                    centre,
+                    radius: radii[rng.below(if seed < 8 { 5 } else { 1 })],
+                };
+                let is_free = made.distance([0.0; 3]) > 1.5 && length(centre) < 6.5;
+>>>>>>> tunnels
                 if is_free && balls.iter().all(|b| length(sub(b.centre, centre)) > 1.6) {
                     balls.push(made);
                 }
@@ -369,16 +383,28 @@ mod tests {
             };
             let exact = find(&balls, [0.0; 3], &params, &Silent).expect("a start inside");
             let exact = exact.widest.expect("a way");
+<<<<<<< HEAD
             let found = known(&balls, [0.0; 3], 1e-3);
+=======
+            let found = known(&balls, [0.0; 3], 0.02);
+>>>>>>> tunnels
             assert!(
                 found.lower <= exact.upper && exact.lower <= found.upper,
                 "{seed}: {found:?} {exact:?}"
             );
+<<<<<<< HEAD
             assert!(found.upper - found.lower <= 1e-3, "{seed}");
             narrow += usize::from(exact.lower < 1.5);
         }
         assert!(
             narrow > 25,
+=======
+            assert!(found.upper - found.lower <= 0.02, "{seed}");
+            narrow += usize::from(exact.lower < 1.5);
+        }
+        assert!(
+            narrow > 6,
+>>>>>>> tunnels
             "{narrow}: most should have a gate narrower than the start"
         );
     }

@@ -110,6 +110,11 @@ impl Clearance {
         }
     }
 
+    /// The largest radius; 0 without balls.
+    pub fn largest(&self) -> f64 {
+        self.nodes.first().map_or(0.0, |root| root.radius)
+    }
+
     /// The nearest ball; the first given of those equally near. None without balls.
     pub fn nearest(&self, p: [f64; 3]) -> Option<Near> {
         let mut best: Option<Near> = None;

@@ -49,8 +49,8 @@ impl Element {
             b"P" => return Some(Element(15)),
             _ => {}
         }
-        let is_it = |known: &&str| known.as_bytes().eq_ignore_ascii_case(symbol);
-        let place = SYMBOLS.iter().position(|known| is_it(&known))?;
+        let is_it = |known: &str| known.as_bytes().eq_ignore_ascii_case(symbol);
+        let place = SYMBOLS.iter().position(|known| is_it(known))?;
         Some(Element(place as u8 + 1))
     }
 
@@ -124,10 +124,10 @@ impl Element {
 
     fn leading_pair(letters: &[u8], known: &[&str]) -> Option<Element> {
         let pair = letters.get(..2)?;
-        let is_known = |symbol: &&str| symbol.as_bytes().eq_ignore_ascii_case(pair);
+        let is_known = |symbol: &str| symbol.as_bytes().eq_ignore_ascii_case(pair);
         known
             .iter()
-            .any(|symbol| is_known(&symbol))
+            .any(|symbol| is_known(symbol))
             .then(|| Element::from_symbol(pair))?
     }
 }

@@ -1,12 +1,14 @@
 //! What is in a molecule, and what looks wrong with it.
 
 use super::altlocs;
-use super::molecule::Molecule;
+use super::element::Element;
+use super::molecule::{Atom, Molecule, Residue};
 use super::polymer::{Class, classes};
 use super::select::{NamedCount, NamedCounts, in_nanometres};
 use super::spacing::median_spacing;
 use crate::numeric::vector::Vec3;
 use crate::report::{Tally, Warning};
+use rayon::prelude::*;
 use schemars::JsonSchema;
 use serde::Serialize;
 use std::collections::{BTreeMap, BTreeSet};
@@ -61,72 +63,83 @@ pub struct ElementCount {
 ///
 /// Cost: n log n in the atoms.
 pub fn inventory(molecule: &Molecule) -> Inventory {
-    let residues = molecule.residues_in(0);
-    let first = residues.start;
     let classes = classes(molecule, 0);
-    let [mut polymer_residues, mut waters] = [0; 2];
-    let mut hetero = NamedCounts::default();
-    let mut chains = Vec::new();
-    let mut known = BTreeSet::new();
-    for (residue, class) in molecule.residues[residues.clone()].iter().zip(&classes) {
-        match class {
-            Class::Polymer => polymer_residues += 1,
-            Class::Water => waters += 1,
-            Class::Hetero => hetero.add(residue.name, residue.atoms.len() as u64),
-        }
-        if known.insert(residue.chain) {
-            chains.push(residue.chain.to_string());
-        }
-    }
-    let of_first = molecule.models.first().map_or(0..0, |m| m.atoms.clone());
-    let atoms = molecule.atoms_in(&of_first);
-    let mut elements = BTreeMap::new();
+    let residues = &molecule.residues[molecule.residues_in(0)];
+    let first = molecule.models.first().map_or(0..0, |m| m.atoms.clone());
+    let atoms = molecule.atoms_in(&first);
+    let of_class = |wanted| classes.iter().filter(|class| **class == wanted).count() as u64;
+    let count = |holds: fn(&Atom) -> bool| atoms.iter().filter(|atom| holds(atom)).count() as u64;
     let mut unknown = Tally::default();
-    for (index, atom) in (0..).zip(atoms) {
-        *elements.entry(atom.element).or_insert(0) += 1;
-        if atom.element.0 == 0 && atom.radius.is_none() {
-            unknown.note(index);
-        }
+    let is_unknown = |atom: &Atom| atom.element == Element::UNKNOWN && atom.radius.is_none();
+    for (index, _) in (0..).zip(atoms).filter(|(_, atom)| is_unknown(atom)) {
+        unknown.note(index);
     }
-    let mut one_each: Vec<u32> = of_first.clone().collect();
-    let is_polymer = |residue: u32| classes[residue as usize - first] == Class::Polymer;
-    let mut stays = altlocs::kept(molecule, &one_each, is_polymer).into_iter();
-    one_each.retain(|_| stays.next() == Some(true));
-    let centers: Vec<Vec3> = one_each
-        .iter()
-        .map(|index| molecule.atoms[*index as usize].position)
-        .collect();
-    let count =
-        |holds: &dyn Fn(&super::Atom) -> bool| atoms.iter().filter(|a| holds(a)).count() as u64;
+    let centers = centers_of_one_each(molecule, &classes);
     let mut models = molecule.models.iter();
-    let other_size = models.position(|model| model.atoms.len() != of_first.len());
+    let other_size = models.position(|model| model.atoms.len() != first.len());
     Inventory {
         id: Some(molecule.id.clone()).filter(|id| !id.is_empty()),
         models: molecule.models.len() as u64,
         atoms: molecule.atoms.len() as u64,
         atoms_in_model: atoms.len() as u64,
-        chains,
-        polymer_residues,
-        waters,
-        hetero: hetero.rows(),
-        elements: elements
-            .into_iter()
-            .map(|(element, atoms)| ElementCount {
-                symbol: element.symbol().to_owned(),
-                atoms,
-            })
-            .collect(),
-        altlocs: count(&|atom| atom.altloc != b' '),
-        insertions: molecule.residues[residues]
-            .iter()
-            .filter(|residue| residue.insertion != b' ')
-            .count() as u64,
-        with_radius: count(&|atom| atom.radius.is_some()),
+        chains: chains(residues),
+        polymer_residues: of_class(Class::Polymer),
+        waters: of_class(Class::Water),
+        hetero: hetero(residues, &classes),
+        elements: elements(atoms),
+        altlocs: count(|atom| atom.altloc != b' '),
+        insertions: residues.iter().filter(|r| r.insertion != b' ').count() as u64,
+        with_radius: count(|atom| atom.radius.is_some()),
         coincident: coincident(&centers),
         median_spacing: median_spacing(&centers),
         unknown,
         first_other_size: other_size.map(|index| index as u64),
     }
+}
+
+/// Names of chains, in the order in which they begin.
+fn chains(residues: &[Residue]) -> Vec<String> {
+    let mut known = BTreeSet::new();
+    let first_time = residues
+        .iter()
+        .filter(|residue| known.insert(residue.chain));
+    first_time
+        .map(|residue| residue.chain.to_string())
+        .collect()
+}
+
+fn hetero(residues: &[Residue], classes: &[Class]) -> Vec<NamedCount> {
+    let mut counts = NamedCounts::default();
+    for (residue, class) in residues.iter().zip(classes) {
+        if *class == Class::Hetero {
+            counts.add(residue.name, residue.atoms.len() as u64);
+        }
+    }
+    counts.rows()
+}
+
+fn elements(atoms: &[Atom]) -> Vec<ElementCount> {
+    let mut counts: BTreeMap<Element, u64> = BTreeMap::new();
+    for atom in atoms {
+        *counts.entry(atom.element).or_default() += 1;
+    }
+    let rows = counts.into_iter().map(|(element, atoms)| ElementCount {
+        symbol: element.symbol().to_owned(),
+        atoms,
+    });
+    rows.collect()
+}
+
+/// Centres of the atoms of the first model, each at one of its places.
+fn centers_of_one_each(molecule: &Molecule, classes: &[Class]) -> Vec<Vec3> {
+    let begin = molecule.residues_in(0).start;
+    let is_polymer = |residue: u32| classes[residue as usize - begin] == Class::Polymer;
+    let first = molecule.models.first().map_or(0..0, |m| m.atoms.clone());
+    let all: Vec<u32> = first.collect();
+    let stays = altlocs::kept(molecule, &all, is_polymer);
+    let kept = all.iter().zip(stays).filter(|(_, stays)| *stays);
+    kept.map(|(index, _)| molecule.atoms[*index as usize].position)
+        .collect()
 }
 
 /// How many points are exactly where another one is.
@@ -135,7 +148,7 @@ fn coincident(points: &[Vec3]) -> u64 {
         .iter()
         .map(|p| p.map(|c| (c + 0.0).to_bits()))
         .collect();
-    bits.sort_unstable();
+    bits.par_sort_unstable();
     bits.dedup();
     (points.len() - bits.len()) as u64
 }
@@ -175,7 +188,6 @@ impl Inventory {
 mod tests {
     use super::*;
     use crate::protein::builder::tests::{atom, built};
-    use crate::protein::molecule::Atom;
 
     #[test]
     fn everything_is_counted() {
@@ -197,7 +209,7 @@ mod tests {
         ]);
         molecule.id = "1XYZ".into();
         molecule.atoms[5].radius = Some(1.4);
-        molecule.atoms[4].element = super::super::Element::UNKNOWN;
+        molecule.atoms[4].element = Element::UNKNOWN;
         let found = inventory(&molecule);
         assert_eq!(found.chains, ["B", "A"]);
         assert_eq!((found.models, found.atoms, found.atoms_in_model), (1, 6, 6));

@@ -9,7 +9,7 @@ use super::name::Name;
 use super::polymer::{Class, classes};
 use super::radii::{Origin, Radii};
 use super::spacing::{NANOMETRES, median_spacing};
-use crate::error::{Error, Result, number};
+use crate::error::{Error, Fault, Result, number};
 use crate::numeric::vector::Vec3;
 use crate::report::{Tally, Warning};
 use rayon::prelude::*;
@@ -317,17 +317,20 @@ fn in_space(a: Vec3, b: Vec3) -> Ordering {
 
 /// Which atoms stay when of those with one centre the largest does, and of equal ones the first.
 fn without_coincident(molecule: &Molecule, atoms: &[u32], radii: &[(f64, Origin)]) -> Vec<bool> {
-    let center = |at: u32| molecule.atoms[atoms[at as usize] as usize].position;
+    // Coordinates beside their indices: the sort is most of the work of a large selection.
+    let mut order: Vec<(Vec3, u32)> = (0..)
+        .zip(atoms)
+        .map(|(at, index)| (molecule.atoms[*index as usize].position, at))
+        .collect();
     let size = |at: u32| radii[at as usize].0;
-    let mut order: Vec<u32> = (0..atoms.len() as u32).collect();
-    order.par_sort_unstable_by(|a, b| {
-        let place = in_space(center(*a), center(*b));
+    order.par_sort_unstable_by(|(p, a), (q, b)| {
+        let place = in_space(*p, *q);
         place.then_with(|| size(*b).total_cmp(&size(*a)).then(a.cmp(b)))
     });
     let mut stays = vec![true; atoms.len()];
     for pair in order.windows(2) {
-        if in_space(center(pair[0]), center(pair[1])) == Ordering::Equal {
-            stays[pair[1] as usize] = false;
+        if in_space(pair[0].0, pair[1].0) == Ordering::Equal {
+            stays[pair[1].1 as usize] = false;
         }
     }
     stays
@@ -370,7 +373,7 @@ fn nothing_left(counts: &SelectionCounts) -> Error {
             names.join(", ")
         }
     );
-    let fault = crate::error::Fault::whole(problem);
+    let fault = Fault::whole(problem);
     Error::Geometry(fault.with_hint("--keep NAME,... keeps residues that are no polymer"))
 }
 
@@ -420,8 +423,8 @@ mod tests {
             residues: 1,
             atoms: 2,
         };
-        assert_eq!(counts.hetero_dropped, [heme.clone()]);
-        let radii: Vec<f64> = selected.balls.iter().map(|s| s.radius).collect();
+        assert_eq!(counts.hetero_dropped, std::slice::from_ref(&heme));
+        let radii: Vec<f64> = selected.balls.iter().map(|b| b.radius).collect();
         assert_eq!(radii, [1.55, 1.7, 1.2]);
         let with = Selected::of(&molecule, 0, &keeping(&["hem", "HOH"])).expect("atoms");
         assert_eq!(with.atoms.len(), 7);

@@ -3,6 +3,7 @@
 use super::altlocs;
 use super::molecule::{Molecule, Residue, write_place};
 use super::name::Name;
+use super::polymer::{Class, classes};
 use super::select::there_are;
 use crate::error::{Error, Result};
 use crate::numeric::vector::{Vec3, add, scale, sub};
@@ -208,7 +209,7 @@ fn find_residues(molecule: &Molecule, model: usize, id: &ResidueId) -> Result<Ve
     let residue = |index: &usize| &molecule.residues[*index];
     let found: Vec<usize> = all.clone().filter(|i| id.is(residue(i))).collect();
     let Some(first) = found.first() else {
-        return Err(no_residue(&molecule.residues[all], id));
+        return Err(no_residue(molecule, model, id));
     };
     let elsewhere = found
         .iter()
@@ -224,10 +225,19 @@ fn find_residues(molecule: &Molecule, model: usize, id: &ResidueId) -> Result<Ve
 }
 
 /// `no residue A:999: chain A has 4 to 297`.
-fn no_residue(residues: &[Residue], id: &ResidueId) -> String {
+fn no_residue(molecule: &Molecule, model: usize, id: &ResidueId) -> String {
+    let residues = &molecule.residues[molecule.residues_in(model)];
+    let classes = classes(molecule, model);
     let numbers = |chain: &Name| -> Vec<i32> {
-        let of_it = residues.iter().filter(|residue| residue.chain == *chain);
-        of_it.map(|residue| residue.number).collect()
+        let of_it = residues.iter().zip(&classes);
+        let of_it = of_it.filter(|(residue, _)| residue.chain == *chain);
+        // Numbers of water may be far from those of its chain.
+        let is_polymer = |class: &Class| *class == Class::Polymer;
+        let has_polymer = of_it.clone().any(|(_, class)| is_polymer(class));
+        of_it
+            .filter(|(_, class)| is_polymer(class) || !has_polymer)
+            .map(|(residue, _)| residue.number)
+            .collect()
     };
     let mut chains: Vec<Name> = residues.iter().map(|residue| residue.chain).collect();
     chains.sort_unstable();
@@ -439,7 +449,7 @@ mod tests {
         for (start, problem) in [
             (
                 Start::residues("A:999"),
-                "--start-residues A:999: no residue A:999: chain A has 4 to 401",
+                "--start-residues A:999: no residue A:999: chain A has 4 to 52",
             ),
             (
                 Start::residues("C:4"),

@@ -57,8 +57,8 @@ pub struct Columns(Vec<Option<usize>>);
 impl Columns {
     /// Adds the next column, whose name is without its category.
     pub fn push(&mut self, column: &[u8]) {
-        let is_it = |known: &&str| known.as_bytes().eq_ignore_ascii_case(column);
-        self.0.push(READ.iter().position(|known| is_it(&known)));
+        let is_it = |known: &str| known.as_bytes().eq_ignore_ascii_case(column);
+        self.0.push(READ.iter().position(|known| is_it(known)));
     }
 
     /// How many there are.

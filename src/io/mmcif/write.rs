@@ -114,9 +114,7 @@ fn write_atom(text: &mut Vec<u8>, atom: &Atom, of: &Words) -> io::Result<()> {
     }
     write!(text, "{} ", of.sequence)?;
     text.extend(&of.insertion);
-    let factor = atom
-        .radius
-        .map_or_else(|| shortest(atom.b_factor), |radius| radius);
+    let factor = atom.radius.unwrap_or_else(|| shortest(atom.b_factor));
     for number in atom
         .position
         .into_iter()
@@ -135,6 +133,11 @@ fn write_atom(text: &mut Vec<u8>, atom: &Atom, of: &Words) -> io::Result<()> {
 
 /// The number of the shortest decimal that reads back as the same number of single precision.
 fn shortest(value: f32) -> f64 {
+    let hundredths = (f64::from(value) * 100.0).round() / 100.0;
+    // Of up to six digits each decimal is read as another number.
+    if value.abs() < 1e4 && hundredths as f32 == value {
+        return hundredths;
+    }
     value.to_string().parse().unwrap_or(f64::from(value))
 }
 

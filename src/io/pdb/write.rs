@@ -2,6 +2,7 @@
 
 use crate::error::number;
 use crate::io::hybrid36;
+use crate::io::text::{push_decimal, spill};
 use crate::protein::{Atom, Molecule, Name, Residue};
 use std::collections::BTreeSet;
 use std::io::{self, Write};
@@ -53,7 +54,7 @@ fn refusal_of_atom(atom: &Atom) -> Option<String> {
         ));
     }
     for value in atom.position {
-        if fixed(value, 8, 3, 3).is_none() {
+        if !fits(value, 8, 3, 3) {
             let value = number(value);
             return Some(format!(
                 "has the coordinate {value}, which does not fit 8 columns"
@@ -64,7 +65,7 @@ fn refusal_of_atom(atom: &Atom) -> Option<String> {
         ("occupancy", f64::from(atom.occupancy)),
         ("radius or temperature factor", factor(atom)),
     ] {
-        if fixed(value, 6, 2, 0).is_none() {
+        if !fits(value, 6, 2, 0) {
             let value = number(value);
             return Some(format!(
                 "has the {what} {value}, which does not fit 6 columns"
@@ -87,21 +88,51 @@ fn factor(atom: &Atom) -> f64 {
 
 /// How many atoms have coordinates, and how many a radius, with more decimals than there are columns.
 pub fn rounded(molecule: &Molecule) -> [u64; 2] {
-    let loses = |value: f64, decimals: usize| format!("{value:.decimals$}").parse() != Ok(value);
+    let loses = |value: f64, unit: f64| (value * unit).round() / unit != value;
     let mut rounded = [0; 2];
     for atom in &molecule.atoms {
-        rounded[0] += u64::from(atom.position.iter().any(|c| loses(*c, 3)));
-        rounded[1] += u64::from(atom.radius.is_some_and(|radius| loses(radius, 2)));
+        rounded[0] += u64::from(atom.position.iter().any(|c| loses(*c, 1e3)));
+        rounded[1] += u64::from(atom.radius.is_some_and(|radius| loses(radius, 1e2)));
     }
     rounded
 }
 
-/// A number in a width, with `decimals` decimals, or with as many fewer as it takes, but at least `least`.
-fn fixed(value: f64, width: usize, decimals: usize, least: usize) -> Option<String> {
+/// Appends a number in a width, with `decimals` decimals, or with as many fewer as it takes, but at least
+/// `least`. `None`, and nothing appended, where it does not fit.
+fn push_fixed(
+    text: &mut Vec<u8>,
+    value: f64,
+    width: usize,
+    decimals: usize,
+    least: usize,
+) -> Option<()> {
+    let scaled = value * 10f64.powi(decimals as i32);
+    let nearest = scaled.round();
+    // Far from a tie and small, all ways of rounding agree.
+    if (scaled - nearest).abs() < 0.25 && nearest.abs() < 1e9 {
+        let from = text.len();
+        text.extend_from_slice(&b"        "[..width]);
+        push_decimal(text, nearest as i64, decimals);
+        let length = text.len() - from - width;
+        if length <= width {
+            text.drain(from..from + length);
+            return Some(());
+        }
+        text.truncate(from);
+    }
     (least..=decimals).rev().find_map(|decimals| {
-        let text = format!("{value:width$.decimals$}");
-        (text.len() <= width).then_some(text)
+        let number = format!("{value:width$.decimals$}");
+        let fits = number.len() <= width;
+        fits.then(|| text.extend_from_slice(number.as_bytes()))
     })
+}
+
+/// Whether [`push_fixed`] finds a way.
+fn fits(value: f64, width: usize, decimals: usize, least: usize) -> bool {
+    // Far from the ends all ways of rounding agree.
+    let largest = 10f64.powi((width - decimals - 1) as i32);
+    let is_inside = value > 1.0 - largest / 10.0 && value < largest - 1.0;
+    is_inside || push_fixed(&mut Vec::new(), value, width, decimals, least).is_some()
 }
 
 /// Writes the records `MODRES` of residues that are held as `HETATM` but stand in a polymer.
@@ -165,7 +196,7 @@ pub fn write(molecule: &Molecule, out: &mut dyn Write) -> io::Result<()> {
             for atom in molecule.atoms_in(&residue.atoms) {
                 write_atom(&mut text, atom, residue).ok_or_else(no_room)?;
             }
-            crate::io::text::spill(&mut text, out)?;
+            spill(&mut text, out)?;
         }
         writeln!(text, "{:<80}", "TER")?;
         if has_models {
@@ -185,55 +216,51 @@ fn no_room() -> io::Error {
 
 /// One line; `None` where something does not fit.
 fn write_atom(text: &mut Vec<u8>, atom: &Atom, residue: &Residue) -> Option<()> {
-    let [x, y, z] = atom.position.map(|c| fixed(c, 8, 3, 3));
+    let record = if atom.hetero { "HETATM" } else { "ATOM" };
+    let serial = hybrid36::write(atom.serial, 5)?;
     // Writing into a vector does not fail.
-    writeln!(
-        text,
-        "{:<6}{:>5} {}{}{:<4}{:1}{:>4}{}   {}{}{}{}{}{:10}{:>2}  ",
-        if atom.hetero { "HETATM" } else { "ATOM" },
-        hybrid36::write(atom.serial, 5)?,
-        name_columns(atom),
-        char::from(atom.altloc),
-        residue_columns(residue),
-        residue.chain,
-        hybrid36::write(i64::from(residue.number), 4)?,
-        char::from(residue.insertion),
-        x?,
-        y?,
-        z?,
-        fixed(f64::from(atom.occupancy), 6, 2, 0)?,
-        fixed(factor(atom), 6, 2, 0)?,
-        "",
-        atom.element.symbol().to_ascii_uppercase(),
-    )
-    .ok()
+    let _ = write!(text, "{record:<6}{serial:>5} ");
+    push_name(text, atom);
+    text.push(atom.altloc);
+    let name = if residue.name.is_empty() {
+        "UNK"
+    } else {
+        residue.name.as_str()
+    };
+    let number = hybrid36::write(i64::from(residue.number), 4)?;
+    let _ = match name.len() {
+        // Names end in the third column; those of four letters take the blank that follows.
+        0..=3 => write!(text, "{name:>3} "),
+        _ => write!(text, "{name}"),
+    };
+    let _ = write!(text, "{:1}{number:>4}", residue.chain);
+    text.push(residue.insertion);
+    text.extend_from_slice(b"   ");
+    for coordinate in atom.position {
+        push_fixed(text, coordinate, 8, 3, 3)?;
+    }
+    push_fixed(text, f64::from(atom.occupancy), 6, 2, 0)?;
+    push_fixed(text, factor(atom), 6, 2, 0)?;
+    let symbol = atom.element.symbol();
+    let from = text.len() + 10;
+    let _ = writeln!(text, "{:10}{symbol:>2}  ", "");
+    text[from..].make_ascii_uppercase();
+    Some(())
 }
 
 /// Names shorter than the four columns begin in the second, unless the symbol has two letters.
-fn name_columns(atom: &Atom) -> String {
+fn push_name(text: &mut Vec<u8>, atom: &Atom) {
     let name = if atom.name.is_empty() {
         "X"
     } else {
         atom.name.as_str()
     };
     let symbol = atom.element.symbol();
-    let is_wide = symbol.len() == 2
-        && name
-            .get(..2)
-            .is_some_and(|start| start.eq_ignore_ascii_case(symbol));
-    if name.len() >= 4 || is_wide {
-        format!("{name:<4}")
+    let start = name.get(..2).unwrap_or_default();
+    let is_wide = symbol.len() == 2 && start.eq_ignore_ascii_case(symbol);
+    let _ = if name.len() >= 4 || is_wide {
+        write!(text, "{name:<4}")
     } else {
-        format!(" {name:<3}")
-    }
-}
-
-/// Names end in the third column; those of four letters take the blank that follows.
-fn residue_columns(residue: &Residue) -> String {
-    let name = if residue.name.is_empty() {
-        "UNK"
-    } else {
-        residue.name.as_str()
+        write!(text, " {name:<3}")
     };
-    format!("{name:>3}")
 }

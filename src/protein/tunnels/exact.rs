@@ -10,9 +10,9 @@
 //! The critical width is guessed from the balls that touch three atoms, near which it must lie once the
 //! triangulation is that of a near `t`; guesses that do not close the gap are followed by bisection.
 
+use super::crop::Crop;
 use super::graph::{Graph, Metric};
-use super::search::{Closed, Extent, Outside, widest};
-use crate::error::Result;
+use super::search::{Closed, Extent, Outside, Unfinished, widest};
 use crate::progress::Progress;
 use crate::protein::clearance::{Ball, Clearance};
 use crate::spatial::delaunay3::Delaunay3;
@@ -47,6 +47,8 @@ pub struct Question<'a> {
     pub guess: f64,
     /// How far the bounds may be apart.
     pub tolerance: f64,
+    /// Where the balls are only those around the start.
+    pub crop: Option<&'a Crop<'a>>,
 }
 
 /// Powers this small, over the square of the largest ball, are not told from 0.
@@ -71,7 +73,7 @@ impl<'a> Question<'a> {
     /// Each step costs a regular triangulation of all balls and up to three searches; there are two to
     /// four as a rule. Where rounding keeps the signs from being told, the bracket stays wider than the
     /// tolerance.
-    pub fn answer(&self, progress: &dyn Progress) -> Result<Bracket<'a>> {
+    pub fn answer(&self, progress: &dyn Progress) -> Result<Bracket<'a>, Unfinished> {
         let (mut lower, mut upper) = (self.lower, self.upper.max(self.lower));
         let mut guess = self.guess.clamp(lower, upper);
         let (mut triangulations, mut settled) = (0, 0);
@@ -128,7 +130,7 @@ impl<'a> Question<'a> {
     }
 
     /// What the balls grown by `t` leave.
-    fn step(&self, t: f64) -> Result<Step<'a>> {
+    fn step(&self, t: f64) -> Result<Step<'a>, Unfinished> {
         let largest = self
             .balls
             .iter()
@@ -140,7 +142,10 @@ impl<'a> Question<'a> {
             self.balls,
             self.clearance,
         );
-        let outside = Outside::hull(&graph);
+        let mut outside = match self.crop {
+            Some(crop) => Outside::around(&graph, crop),
+            None => Outside::hull(&graph),
+        };
         let Some(start) = graph.triangulation.locate(self.start, None) else {
             return Ok(Step {
                 is_open: Some(true),
@@ -153,28 +158,24 @@ impl<'a> Question<'a> {
         let power = self.power(t);
         let mut settled = 0;
         let mut search = |graph: &mut Graph, width: f64| {
-            let found = widest(
-                graph,
-                start,
-                width,
-                &outside,
-                &Closed::default(),
-                Extent::Reduced,
-            );
+            let any = f64::NEG_INFINITY;
+            let open = Closed::none(graph);
+            let reduced = Extent::Reduced;
+            let found = widest(graph, start, width, &mut outside, &open, reduced, any)?;
             settled += found.settled;
-            found.route.map_or(f64::NEG_INFINITY, |route| route.width)
+            Ok::<f64, Unfinished>(found.route.map_or(any, |route| route.width))
         };
         let room = UNDECIDED * largest * largest;
-        let is_open = match search(&mut graph, power) {
+        let is_open = match search(&mut graph, power)? {
             width if width > room => Some(true),
             width if width < -room => Some(false),
             _ => None,
         };
         let clear = self.clearance.at(self.start);
         let mut graph = graph.under(Metric::Touching);
-        let touching = search(&mut graph, clear);
+        let touching = search(&mut graph, clear)?;
         let mut graph = graph.under(Metric::Along);
-        let way = search(&mut graph, clear);
+        let way = search(&mut graph, clear)?;
         Ok(Step {
             is_open,
             way,

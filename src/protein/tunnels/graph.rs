@@ -5,6 +5,7 @@
 //! else at the end of the edge nearer to it (Medek, Benes and Sochor 2007, section 3). Widths are worked
 //! out when a search asks for them, and kept.
 
+use super::sparse::Sparse;
 use crate::numeric::vector::{cross, dot, length, sub};
 use crate::protein::clearance::{Ball, Clearance};
 use crate::spatial::delaunay3::{
@@ -62,9 +63,9 @@ pub struct Graph<'a> {
     /// The balls of the vertices of the triangulation, by input.
     balls: &'a [Ball],
     clearance: &'a Clearance,
-    nodes: Vec<Node>,
+    nodes: Sparse<Node>,
     /// By cell and slot; NaN while unknown.
-    gates: Vec<[f64; 4]>,
+    gates: Sparse<[f64; 4]>,
     evaluated: u64,
     /// The largest radius, and the weight that goes with it.
     largest: f64,
@@ -80,17 +81,27 @@ impl<'a> Graph<'a> {
         clearance: &'a Clearance,
     ) -> Self {
         let cells = triangulation.cells().len();
-        let largest = balls.iter().map(|b| b.radius);
-        let heaviest = triangulation.points().iter().map(|p| p[3]);
+        // Of all atoms, those among them that are not triangulated.
+        let largest = clearance.largest();
+        let heaviest = triangulation
+            .points()
+            .iter()
+            .map(|p| p[3])
+            .fold(0.0, f64::max);
+        let own = balls.iter().map(|ball| ball.radius).fold(0.0, f64::max);
+        let heaviest = match heaviest == 0.0 {
+            true => 0.0,
+            false => (heaviest.sqrt() + largest - own).powi(2),
+        };
         Graph {
-            largest: largest.fold(f64::NEG_INFINITY, f64::max),
-            heaviest: heaviest.fold(f64::NEG_INFINITY, f64::max),
+            largest,
+            heaviest,
             triangulation,
             metric,
             balls,
             clearance,
-            nodes: vec![UNKNOWN; cells],
-            gates: vec![[f64::NAN; 4]; cells],
+            nodes: Sparse::new(cells, UNKNOWN),
+            gates: Sparse::new(cells, [f64::NAN; 4]),
             evaluated: 0,
         }
     }
@@ -114,8 +125,9 @@ impl<'a> Graph<'a> {
     pub fn bytes(&self) -> u64 {
         let cells = self.triangulation.cells().len();
         let points = self.triangulation.points().len();
-        let of_cell = size_of::<Cell>() + size_of::<Node>() + size_of::<[f64; 4]>();
-        (cells * of_cell + points * (size_of::<[f64; 4]>() + 2 * size_of::<u32>())) as u64
+        let of_point = size_of::<[f64; 4]>() + 2 * size_of::<u32>();
+        let triangulation = (cells * size_of::<Cell>() + points * of_point) as u64;
+        triangulation + self.nodes.bytes() + self.gates.bytes()
     }
 
     /// A cell of the triangulation.
@@ -141,7 +153,7 @@ impl<'a> Graph<'a> {
 
     /// The dual vertex of a finite cell; cells at infinity are infinitely wide.
     pub fn node(&mut self, cell: u32) -> Node {
-        let known = self.nodes[cell as usize];
+        let known = self.nodes.get(cell);
         if !known.width.is_nan() {
             return known;
         }
@@ -163,7 +175,7 @@ impl<'a> Graph<'a> {
                 width: f64::INFINITY,
             }
         };
-        self.nodes[cell as usize] = node;
+        *self.nodes.at(cell) = node;
         node
     }
 
@@ -183,7 +195,12 @@ impl<'a> Graph<'a> {
 
     /// Whether a point is the dual vertex of a cell of this graph.
     pub fn is_centre(&self, cell: u32, p: [f64; 3]) -> bool {
-        (cell as usize) < self.nodes.len() && self.centre(cell) == p
+        (cell as usize) < self.triangulation.cells().len() && self.centre(cell) == p
+    }
+
+    /// The largest weight that any atom would have.
+    pub fn heaviest(&self) -> f64 {
+        self.heaviest
     }
 
     /// The nearest atom.
@@ -193,16 +210,16 @@ impl<'a> Graph<'a> {
 
     /// How wide the way is through the facet of `cell` opposite `slot`.
     pub fn gate(&mut self, cell: u32, slot: usize) -> f64 {
-        let known = self.gates[cell as usize][slot];
+        let known = self.gates.get(cell)[slot];
         if !known.is_nan() {
             return known;
         }
         let width = self.measure(cell, slot);
         self.evaluated += 1;
-        self.gates[cell as usize][slot] = width;
+        self.gates.at(cell)[slot] = width;
         let beyond = self.cell(cell).neighbours[slot];
         if let Some(back) = self.cell(beyond).neighbours.iter().position(|n| *n == cell) {
-            self.gates[beyond as usize][back] = width;
+            self.gates.at(beyond)[back] = width;
         }
         width
     }

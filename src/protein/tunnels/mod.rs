@@ -19,14 +19,18 @@
 //! same with the smallest is an upper bound, and differs by the difference of the radii alone.
 
 mod balls;
+pub mod cluster;
+mod crop;
 pub mod cut;
 mod exact;
 pub mod graph;
 mod grid;
 mod params;
+pub mod pores;
 pub mod search;
 pub mod shape;
 mod solid;
+mod sparse;
 mod start;
 mod trade;
 pub mod tunnel;
@@ -46,8 +50,9 @@ use crate::numeric::vector::{length, sub};
 use crate::progress::Progress;
 use crate::protein::clearance::{Ball, Clearance};
 use crate::spatial::delaunay3::Delaunay3;
+use crop::Crop;
 use graph::{Graph, Metric};
-use search::{Closed, Found, Outside, Route, cheapest, widest};
+use search::{Closed, Found, Outside, Route, Unfinished, cheapest, widest};
 
 /// The widest way out, as well as it is known.
 #[derive(Debug, Clone, PartialEq)]
@@ -115,33 +120,92 @@ pub fn find(
         )));
     }
     let clearance = Clearance::new(balls);
-    progress.stage("triangulate", 0);
-    let centres: Vec<[f64; 3]> = balls.iter().map(|ball| ball.centre).collect();
-    let triangulation = Delaunay3::new(&centres);
-    progress.stage("search", 0);
-    let graph = Graph::new(triangulation, Metric::Touching, balls, &clearance);
+    let may_crop = params.exit == Exit::Shell && !matches!(params.method, Method::Grid(_));
+    let mut reach = CROP * params.shell_radius;
+    while may_crop && balls.len() > params.whole {
+        let crop = Crop::new(given, reach, balls, &clearance, params.shell_radius);
+        let near: Vec<Ball> = balls
+            .iter()
+            .filter(|ball| crop.has(ball))
+            .copied()
+            .collect();
+        if 2 * near.len() > balls.len() {
+            break;
+        }
+        let search = Search {
+            balls: &near,
+            all: balls,
+            clearance: &clearance,
+            params,
+            progress,
+            crop: Some(&crop),
+        };
+        match search.run(given) {
+            Err(Halt::Unfinished) => reach *= 1.5,
+            Err(Halt::Failed(error)) => return Err(error),
+            Ok(found) => return Ok(found),
+        }
+    }
     let search = Search {
         balls,
+        all: balls,
         clearance: &clearance,
         params,
         progress,
+        crop: None,
     };
-    search.run(graph, given)
+    match search.run(given) {
+        Err(Halt::Unfinished) => unreachable!("no atom is left out"),
+        Err(Halt::Failed(error)) => Err(error),
+        Ok(found) => Ok(found),
+    }
+}
+
+/// The first crop reaches so many times the shell's radius around the start.
+const CROP: f64 = 10.0;
+
+/// Bytes of a graph, per atom: some 6.8 cells, in the making, and what few of them have of nodes and gates.
+const BYTES: u64 = 450;
+
+/// Why a search ended without a result.
+enum Halt {
+    /// It came to where atoms were left out.
+    Unfinished,
+    /// There is none.
+    Failed(Error),
+}
+
+impl From<Unfinished> for Halt {
+    fn from(Unfinished: Unfinished) -> Self {
+        Halt::Unfinished
+    }
+}
+
+impl From<Error> for Halt {
+    fn from(error: Error) -> Self {
+        Halt::Failed(error)
+    }
 }
 
 /// What all steps of a search need.
 struct Search<'a> {
+    /// The atoms that are triangulated.
     balls: &'a [Ball],
+    /// All atoms.
+    all: &'a [Ball],
+    /// The clearance of all atoms.
     clearance: &'a Clearance,
     params: &'a Params,
     progress: &'a dyn Progress,
+    /// Which atoms are triangulated, where that is not all.
+    crop: Option<&'a Crop<'a>>,
 }
 
 /// Where in a graph ways start, and where they end.
-struct Ends {
+struct Ends<'a> {
     cell: u32,
     width: f64,
-    outside: Outside,
+    outside: Outside<'a>,
 }
 
 /// A way with the width that is certain.
@@ -151,7 +215,25 @@ struct Candidate {
 }
 
 impl<'a> Search<'a> {
-    fn run(&self, mut graph: Graph<'a>, given: [f64; 3]) -> Result<Tunnels> {
+    fn run(&self, given: [f64; 3]) -> Result<Tunnels, Halt> {
+        let count = self.balls.len() as u64;
+        let times = match self.params.method {
+            // The best triangulation so far, and the next.
+            Method::Exact => 2,
+            Method::Balls(balls) => balls as u64 + 1,
+            _ => 1,
+        };
+        if count * BYTES * times > self.params.memory {
+            let what = format!("triangulating {count} atoms");
+            let hint = Some("raise --max-memory");
+            let needed = u128::from(count * BYTES * times);
+            return Err(Error::over_memory(what, needed, self.params.memory, hint).into());
+        }
+        self.progress.stage("triangulate", 0);
+        let centres: Vec<[f64; 3]> = self.balls.iter().map(|ball| ball.centre).collect();
+        let triangulation = Delaunay3::new(&centres);
+        self.progress.stage("search", 0);
+        let mut graph = Graph::new(triangulation, Metric::Touching, self.balls, self.clearance);
         let mut searched = Searched {
             cells: graph.triangulation.finite_cells() as u64,
             triangulations: 1,
@@ -159,6 +241,9 @@ impl<'a> Search<'a> {
             bytes: graph.bytes(),
             ..Searched::default()
         };
+        if searched.cells == 0 && self.crop.is_some() {
+            return Err(Halt::Unfinished);
+        }
         if searched.cells == 0 {
             return Ok(Tunnels {
                 start: Start::alone(given, self.clearance.at(given)),
@@ -168,10 +253,10 @@ impl<'a> Search<'a> {
                 searched,
             });
         }
-        let outside = self.outside(&mut graph);
-        let start = Start::find(&mut graph, given, self.params, &outside)?;
+        let mut outside = self.outside(&mut graph);
+        let start = Start::find(&mut graph, given, self.params, &mut outside)?;
         // With one radius for all, the largest, the triangulation is exact: a bound from both sides.
-        let radii = || self.balls.iter().map(|ball| ball.radius);
+        let radii = || self.all.iter().map(|ball| ball.radius);
         let largest = radii().fold(f64::NEG_INFINITY, f64::max);
         let spread = largest - radii().fold(f64::INFINITY, f64::min);
         let mut uniform = graph.under(Metric::Uniform(largest));
@@ -204,6 +289,7 @@ impl<'a> Search<'a> {
                     upper,
                     guess: found.width,
                     tolerance: self.params.tolerance,
+                    crop: self.crop,
                 };
                 let bracket = question.answer(self.progress)?;
                 (lower, upper) = (bracket.lower, bracket.upper);
@@ -216,15 +302,16 @@ impl<'a> Search<'a> {
         self.tunnels(&mut main, start, width, bounds, searched)
     }
 
-    fn outside(&self, graph: &mut Graph) -> Outside {
-        match self.params.exit {
-            Exit::Hull => Outside::hull(graph),
-            Exit::Shell => Outside::shell(graph, self.params.shell_radius),
+    fn outside(&self, graph: &mut Graph) -> Outside<'a> {
+        match (self.crop, self.params.exit) {
+            (Some(crop), _) => Outside::around(graph, crop),
+            (None, Exit::Hull) => Outside::hull(graph),
+            (None, Exit::Shell) => Outside::shell(graph, self.params.shell_radius),
         }
     }
 
     /// Where ways start and end in a graph.
-    fn ends(&self, graph: &mut Graph, start: &Start) -> Result<Ends> {
+    fn ends(&self, graph: &mut Graph, start: &Start) -> Result<Ends<'a>, Halt> {
         let outside = self.outside(graph);
         let cell = start.cell_in(graph);
         let width = graph.width_at(start.used);
@@ -234,13 +321,29 @@ impl<'a> Search<'a> {
                 width,
                 outside,
             }),
-            None => Err(start::outside(start.used)),
+            None if self.crop.is_some() => Err(Halt::Unfinished),
+            None => Err(start::outside(start.used).into()),
         }
     }
 
-    fn widest(&self, graph: &mut Graph, ends: &Ends, closed: &Closed) -> Found {
+    /// The widest way in a graph; below a width that is not `least`, none.
+    fn widest(
+        &self,
+        graph: &mut Graph,
+        ends: &mut Ends,
+        closed: &Closed,
+        least: f64,
+    ) -> Result<Found, Unfinished> {
         let extent = self.params.extent;
-        widest(graph, ends.cell, ends.width, &ends.outside, closed, extent)
+        widest(
+            graph,
+            ends.cell,
+            ends.width,
+            &mut ends.outside,
+            closed,
+            extent,
+            least,
+        )
     }
 
     /// The widest way in a graph, and what of its width is certain.
@@ -249,9 +352,9 @@ impl<'a> Search<'a> {
         graph: &mut Graph,
         start: &Start,
         searched: &mut Searched,
-    ) -> Result<Candidate> {
-        let ends = self.ends(graph, start)?;
-        let found = self.widest(graph, &ends, &Closed::default());
+    ) -> Result<Candidate, Halt> {
+        let mut ends = self.ends(graph, start)?;
+        let found = self.widest(graph, &mut ends, &Closed::none(graph), f64::NEG_INFINITY)?;
         searched.settled += found.settled;
         searched.gates += graph.evaluated();
         let Some(route) = found.route else {
@@ -261,7 +364,7 @@ impl<'a> Search<'a> {
             });
         };
         let way = self.centreline(graph, &route, &ends, start);
-        let narrowest = tunnel::narrowest(&way, self.balls, self.clearance);
+        let narrowest = tunnel::narrowest(&way, self.all, self.clearance);
         let certain = narrowest.map_or(f64::NEG_INFINITY, |n| n.radius);
         Ok(Candidate {
             width: route.width,
@@ -291,12 +394,11 @@ impl<'a> Search<'a> {
         start: Start,
         width: f64,
         [lower, upper]: [f64; 2],
-        mut searched: Searched,
-    ) -> Result<Tunnels> {
+        searched: Searched,
+    ) -> Result<Tunnels, Halt> {
         self.progress.stage("tunnels", self.params.count as u64);
-        let ends = self.ends(graph, &start)?;
-        searched.outside = ends.outside.count() as u64;
-        let mut closed = Closed::default();
+        let mut ends = self.ends(graph, &start)?;
+        let mut closed = Closed::none(graph);
         let mut made = Tunnels {
             start,
             widest: None,
@@ -306,37 +408,34 @@ impl<'a> Search<'a> {
         };
         let most = 50 * self.params.count + 50;
         for round in 0..most {
-            let found = self.widest(graph, &ends, &closed);
+            // The first is told however narrow it is.
+            let least = if round == 0 {
+                f64::NEG_INFINITY
+            } else {
+                self.params.probe_radius
+            };
+            let found = self.widest(graph, &mut ends, &closed, least)?;
             let Some(route) = found.route else {
                 break;
             };
-            if made.tunnels.len() >= self.params.count
-                || (round > 0 && route.width < self.params.probe_radius)
-            {
+            if made.tunnels.len() >= self.params.count {
                 break;
             }
             // Of all ways that are as wide, the cheapest.
             let prefer = self.params.prefer;
-            let route = cheapest(
+            let width_there = route.width;
+            let cheap = cheapest(
                 graph,
                 ends.cell,
-                route.width,
+                width_there,
                 prefer,
-                &ends.outside,
+                &mut ends.outside,
                 &closed,
-            )
-            .map_or(route.clone(), |other| Route {
-                width: route.width,
-                ..other
-            });
+            )?;
+            let route = cheap.unwrap_or(route);
             let way = self.centreline(graph, &route, &ends, &made.start);
-            let tunnel = Tunnel::along(
-                way,
-                route.width,
-                self.params.step,
-                self.balls,
-                self.clearance,
-            );
+            let tunnel =
+                Tunnel::along(way, route.width, self.params.step, self.all, self.clearance);
             let Some(mut tunnel) = tunnel else {
                 break;
             };
@@ -366,6 +465,7 @@ impl<'a> Search<'a> {
             }
         }
         made.searched.gates += graph.evaluated();
+        made.searched.outside = ends.outside.count() as u64;
         let by_width = |t: &Tunnel| -t.narrowest.radius;
         made.tunnels
             .sort_by(|a, b| by_width(a).total_cmp(&by_width(b)));
@@ -459,7 +559,7 @@ impl<'a> Search<'a> {
         lower: f64,
         upper: f64,
         mut searched: Searched,
-    ) -> Result<Tunnels> {
+    ) -> Result<Tunnels, Halt> {
         self.progress.stage("balls", 0);
         let small = balls::replace(self.balls, count);
         let radius = small[0].radius;
@@ -489,7 +589,7 @@ impl<'a> Search<'a> {
         lower: f64,
         upper: f64,
         mut searched: Searched,
-    ) -> Result<Tunnels> {
+    ) -> Result<Tunnels, Halt> {
         self.progress.stage("grid", 0);
         let way = grid::widest(
             start.used,

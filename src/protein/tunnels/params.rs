@@ -104,8 +104,11 @@ pub struct Params {
     pub tolerance: f64,
     /// Largest distance of stops on a tunnel.
     pub step: f64,
-    /// Bytes that a grid may take.
+    /// Bytes that a graph or a grid may take.
     pub memory: u64,
+    /// Of more atoms than this, only those around the start are triangulated, where that is enough and
+    /// ways end in the solvent.
+    pub whole: usize,
 }
 
 impl Params {
@@ -124,6 +127,7 @@ impl Params {
         tolerance: 1e-6,
         step: 0.5,
         memory: u64::MAX,
+        whole: 20_000,
     };
 
     /// Errs for values out of range.

@@ -1,39 +1,60 @@
 //! The widest way through the graph, and the shortest of those that are as wide.
 
+use super::crop::Crop;
 use super::graph::Graph;
+use super::sparse::Sparse;
 use crate::numeric::vector::{length, sub};
 use crate::trade::named;
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;
 
-/// Where a way may end.
-#[derive(Debug, Clone)]
-pub struct Outside {
-    /// Per cell, whether it is outside.
-    cells: Vec<bool>,
+/// What a cell is to a way that comes to it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Place {
+    /// Part of the molecule: ways go on.
+    Inside,
+    /// The end of a way.
+    Outside,
+    /// Where atoms that were left out may change the triangulation.
+    Unfinished,
 }
 
-impl Outside {
+/// The search came to where atoms were left out: it must be made again with more of them.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Unfinished;
+
+/// Where ways may end.
+pub struct Outside<'a> {
+    /// Per cell what it is, where that is known.
+    places: Sparse<Option<Place>>,
+    /// Where the atoms are only those around a point.
+    crop: Option<&'a Crop<'a>>,
+}
+
+impl<'a> Outside<'a> {
     /// The cells at infinity: a way ends behind a facet of the convex hull.
     pub fn hull(graph: &Graph) -> Self {
-        let cells = graph.triangulation.cells();
-        Outside {
-            cells: cells.iter().map(|cell| !cell.is_finite()).collect(),
+        let mut outside = Outside {
+            places: Sparse::new(graph.triangulation.cells().len(), None),
+            crop: None,
+        };
+        for (cell, index) in graph.triangulation.cells().iter().zip(0..) {
+            if !cell.is_finite() {
+                *outside.places.at(index) = Some(Place::Outside);
+            }
         }
+        outside
     }
 
     /// The bulk solvent: what a probe of radius `shell` reaches from infinity.
     pub fn shell(graph: &mut Graph, shell: f64) -> Self {
         let mut outside = Self::hull(graph);
-        let mut waiting: Vec<u32> = (0u32..)
-            .zip(&outside.cells)
-            .filter_map(|(cell, is_outside)| is_outside.then_some(cell))
-            .collect();
+        let mut waiting: Vec<u32> = outside.places.find(is_outside).collect();
         while let Some(cell) = waiting.pop() {
             for slot in 0..4 {
                 let beyond = graph.cell(cell).neighbours[slot];
-                if !outside.cells[beyond as usize] && graph.gate(cell, slot) >= shell {
-                    outside.cells[beyond as usize] = true;
+                if !outside.has(beyond) && graph.gate(cell, slot) >= shell {
+                    *outside.places.at(beyond) = Some(Place::Outside);
                     waiting.push(beyond);
                 }
             }
@@ -41,30 +62,71 @@ impl Outside {
         outside
     }
 
-    /// Whether a cell is outside.
-    #[inline]
-    pub fn has(&self, cell: u32) -> bool {
-        self.cells[cell as usize]
+    /// Where only the atoms around a point are triangulated: cells from which a probe comes straight out.
+    pub fn around(graph: &Graph, crop: &'a Crop<'a>) -> Self {
+        Outside {
+            places: Sparse::new(graph.triangulation.cells().len(), None),
+            crop: Some(crop),
+        }
     }
 
-    /// How many of the cells are.
-    pub fn count(&self) -> usize {
-        self.cells.iter().filter(|is_outside| **is_outside).count()
+    /// What a cell is.
+    pub fn place(&mut self, graph: &mut Graph, cell: u32) -> Place {
+        match (self.places.get(cell), self.crop) {
+            (Some(place), _) => place,
+            (None, Some(crop)) => {
+                let place = crop.place(graph, cell);
+                *self.places.at(cell) = Some(place);
+                place
+            }
+            (None, None) => Place::Inside,
+        }
     }
+
+    /// Whether a cell is known to be outside.
+    #[inline]
+    pub fn has(&self, cell: u32) -> bool {
+        self.places.get(cell) == Some(Place::Outside)
+    }
+
+    /// Whether no atoms are left out.
+    pub fn is_whole(&self) -> bool {
+        self.crop.is_none()
+    }
+
+    /// The cells that are known to be outside, in order.
+    pub fn all(&self) -> impl Iterator<Item = u32> {
+        self.places.find(is_outside)
+    }
+
+    /// How many cells are known to be outside.
+    pub fn count(&self) -> usize {
+        self.places.find(is_outside).count()
+    }
+}
+
+fn is_outside(place: &Option<Place>) -> bool {
+    *place == Some(Place::Outside)
 }
 
 /// Gates that no way may take.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone)]
 pub struct Closed {
     /// Per cell a bit for each slot.
-    slots: Vec<u8>,
+    slots: Sparse<u8>,
 }
 
 impl Closed {
+    /// None of a graph's.
+    pub fn none(graph: &Graph) -> Self {
+        Closed {
+            slots: Sparse::new(graph.triangulation.cells().len(), 0),
+        }
+    }
+
     /// Closes the facet of `cell` opposite `slot`, from both sides.
     pub fn close(&mut self, graph: &Graph, cell: u32, slot: usize) {
-        self.slots.resize(graph.triangulation.cells().len(), 0);
-        self.slots[cell as usize] |= 1 << slot;
+        *self.slots.at(cell) |= 1 << slot;
         let beyond = graph.cell(cell).neighbours[slot];
         if let Some(back) = graph
             .cell(beyond)
@@ -72,16 +134,14 @@ impl Closed {
             .iter()
             .position(|n| *n == cell)
         {
-            self.slots[beyond as usize] |= 1 << back;
+            *self.slots.at(beyond) |= 1 << back;
         }
     }
 
     /// Whether it is closed.
     #[inline]
     pub fn has(&self, cell: u32, slot: usize) -> bool {
-        self.slots
-            .get(cell as usize)
-            .is_some_and(|slots| slots >> slot & 1 == 1)
+        self.slots.get(cell) >> slot & 1 == 1
     }
 }
 
@@ -117,7 +177,7 @@ pub struct Found {
 
 /// Widest first, then lowest.
 #[derive(Debug, Clone, Copy, PartialEq)]
-struct Wide(f64, u32);
+pub(super) struct Wide(pub f64, pub u32);
 
 impl Eq for Wide {}
 impl Ord for Wide {
@@ -141,56 +201,62 @@ const NONE: u32 = u32::MAX;
 /// alone they would make Prim's tree, whose ways are the widest too.) Here the width of a way is
 /// `min(d[u], w)`, and the last gate counts.
 ///
-/// `O(m log n)` for `m` gates looked at.
+/// Ways narrower than `least` are not followed. `O(m log n)` for `m` gates looked at.
 pub fn widest(
     graph: &mut Graph,
     start: u32,
     width: f64,
-    outside: &Outside,
+    outside: &mut Outside,
     closed: &Closed,
     extent: Extent,
-) -> Found {
+    least: f64,
+) -> Result<Found, Unfinished> {
     let count = graph.triangulation.cells().len();
-    let mut best = vec![f64::NEG_INFINITY; count];
-    let mut from = vec![(NONE, 0u8); count];
-    let mut is_settled = vec![false; count];
+    let mut best = Sparse::new(count, f64::NEG_INFINITY);
+    let mut from = Sparse::new(count, (NONE, 0u8));
+    let mut is_settled = Sparse::new(count, false);
     let mut queue = BinaryHeap::from([Wide(width, start)]);
-    best[start as usize] = width;
+    *best.at(start) = width;
     let (mut settled, mut end) = (0, None);
     while let Some(Wide(width, cell)) = queue.pop() {
-        if std::mem::replace(&mut is_settled[cell as usize], true) {
+        if std::mem::replace(is_settled.at(cell), true) {
             continue;
         }
         settled += 1;
-        if outside.has(cell) {
-            end = end.or(Some(cell));
-            match extent {
-                Extent::Reduced => break,
-                Extent::Full => continue,
+        match (outside.place(graph, cell), extent) {
+            (Place::Unfinished, _) => return Err(Unfinished),
+            (Place::Outside, Extent::Reduced) => {
+                end = Some(cell);
+                break;
             }
+            (Place::Outside, Extent::Full) => {
+                end = end.or(Some(cell));
+                continue;
+            }
+            (Place::Inside, _) => {}
         }
         for slot in 0..4 {
             let beyond = graph.cell(cell).neighbours[slot];
-            if is_settled[beyond as usize] || closed.has(cell, slot) {
+            if is_settled.get(beyond) || closed.has(cell, slot) {
                 continue;
             }
             let through = width.min(graph.gate(cell, slot));
-            if through > best[beyond as usize] {
-                best[beyond as usize] = through;
-                from[beyond as usize] = (cell, slot as u8);
+            if through > best.get(beyond) && through >= least {
+                *best.at(beyond) = through;
+                *from.at(beyond) = (cell, slot as u8);
                 queue.push(Wide(through, beyond));
             }
         }
     }
-    let route = end.map(|end| trace(end, start, best[end as usize], &from));
-    Found { route, settled }
+    let route = end.map(|end| trace(end, start, best.get(end), &from));
+    Ok(Found { route, settled })
 }
 
-fn trace(end: u32, start: u32, width: f64, from: &[(u32, u8)]) -> Route {
+fn trace(end: u32, start: u32, width: f64, from: &Sparse<(u32, u8)>) -> Route {
     let (mut cells, mut slots) = (vec![end], vec![]);
     let mut at = end;
     while at != start {
-        let (before, slot) = from[at as usize];
+        let (before, slot) = from.get(at);
         slots.push(slot as usize);
         cells.push(before);
         at = before;
@@ -222,26 +288,28 @@ pub fn cheapest(
     start: u32,
     width: f64,
     prefer: Prefer,
-    outside: &Outside,
+    outside: &mut Outside,
     closed: &Closed,
-) -> Option<Route> {
+) -> Result<Option<Route>, Unfinished> {
     let count = graph.triangulation.cells().len();
-    let mut best = vec![f64::INFINITY; count];
-    let mut from = vec![(NONE, 0u8); count];
-    let mut is_settled = vec![false; count];
+    let mut best = Sparse::new(count, f64::INFINITY);
+    let mut from = Sparse::new(count, (NONE, 0u8));
+    let mut is_settled = Sparse::new(count, false);
     // The largest first: costs are negative.
     let mut queue = BinaryHeap::from([Wide(-0.0, start)]);
-    best[start as usize] = 0.0;
+    *best.at(start) = 0.0;
     while let Some(Wide(_, cell)) = queue.pop() {
-        if std::mem::replace(&mut is_settled[cell as usize], true) {
+        if std::mem::replace(is_settled.at(cell), true) {
             continue;
         }
-        if outside.has(cell) {
-            return Some(trace(cell, start, width, &from));
+        match outside.place(graph, cell) {
+            Place::Unfinished => return Err(Unfinished),
+            Place::Outside => return Ok(Some(trace(cell, start, width, &from))),
+            Place::Inside => {}
         }
         for slot in 0..4 {
             let beyond = graph.cell(cell).neighbours[slot];
-            if is_settled[beyond as usize] || closed.has(cell, slot) {
+            if is_settled.get(beyond) || closed.has(cell, slot) {
                 continue;
             }
             let gate = graph.gate(cell, slot);
@@ -249,19 +317,19 @@ pub fn cheapest(
                 continue;
             }
             // A way ends at the gate to the outside.
-            let leg = match outside.has(beyond) {
-                true => 0.0,
-                false => price(graph, cell, slot, gate, prefer),
+            let leg = match outside.place(graph, beyond) {
+                Place::Outside => 0.0,
+                _ => price(graph, cell, slot, gate, prefer),
             };
-            let through = best[cell as usize] + leg;
-            if through < best[beyond as usize] {
-                best[beyond as usize] = through;
-                from[beyond as usize] = (cell, slot as u8);
+            let through = best.get(cell) + leg;
+            if through < best.get(beyond) {
+                *best.at(beyond) = through;
+                *from.at(beyond) = (cell, slot as u8);
                 queue.push(Wide(-through, beyond));
             }
         }
     }
-    None
+    Ok(None)
 }
 
 /// What the way through a gate costs, from node to node.

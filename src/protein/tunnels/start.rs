@@ -1,9 +1,10 @@
 //! Where ways start.
 
+use super::Halt;
 use super::graph::Graph;
 use super::params::Params;
-use super::search::Outside;
-use crate::error::{Error, Fault, Result};
+use super::search::{Outside, Place};
+use crate::error::{Error, Fault};
 use crate::numeric::vector::{length, sub};
 
 /// Where ways start.
@@ -39,17 +40,17 @@ impl Start {
 
     /// The dual vertex of largest clearance within the search radius, of those not outside; the given
     /// point itself for a radius of 0.
-    pub fn find(
+    pub(super) fn find(
         graph: &mut Graph,
         given: [f64; 3],
         params: &Params,
-        outside_cells: &Outside,
-    ) -> Result<Self> {
+        outside_cells: &mut Outside,
+    ) -> Result<Self, Halt> {
         let mut start = Start::alone(given, graph.width_at(given));
         if params.start_search > 0.0 {
             let mut best: Option<(f64, f64, u32)> = None;
             for cell in 0..graph.triangulation.cells().len() as u32 {
-                if outside_cells.has(cell) {
+                if outside_cells.has(cell) || !graph.cell(cell).is_finite() {
                     continue;
                 }
                 let centre = graph.centre(cell);
@@ -58,8 +59,10 @@ impl Start {
                     continue;
                 }
                 let width = graph.node(cell).width;
-                if best.is_none_or(|(w, a, _)| (width, -away) > (w, -a))
+                let is_better = best.is_none_or(|(w, a, _)| (width, -away) > (w, -a));
+                if is_better
                     && graph.has_inside(centre, cell)
+                    && outside_cells.place(graph, cell) == Place::Inside
                 {
                     best = Some((width, away, cell));
                 }
@@ -71,12 +74,17 @@ impl Start {
             }
         }
         if start.clearance <= 0.0 {
-            return Err(start.in_an_atom(graph));
+            return Err(start.in_an_atom(graph).into());
         }
-        let cell = start
+        let place = start
             .cell_in(graph)
-            .filter(|cell| !outside_cells.has(*cell));
-        cell.map(|_| start).ok_or_else(|| outside(given))
+            .map(|cell| outside_cells.place(graph, cell));
+        match place {
+            Some(Place::Inside) => Ok(start),
+            Some(Place::Unfinished) => Err(Halt::Unfinished),
+            None if !outside_cells.is_whole() => Err(Halt::Unfinished),
+            Some(Place::Outside) | None => Err(outside(given).into()),
+        }
     }
 
     fn in_an_atom(&self, graph: &Graph) -> Error {

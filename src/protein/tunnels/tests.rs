@@ -508,6 +508,60 @@ fn the_full_search_finds_what_the_reduced_one_does() {
 }
 
 #[test]
+fn atoms_far_from_the_way_out_are_not_triangulated() {
+    // A thick wall with a hole that ends in it, near the start.
+    let mut rng = Rng::new(21, 0);
+    let mut balls = Vec::new();
+    for index in 0..32 * 56 * 56 {
+        let at = [index % 32 - 4, index / 32 % 56, index / 1792].map(|k| f64::from(k - 28));
+        let [x, y, z] = at.map(|k| 1.6 * (k + rng.range(-0.3, 0.3)));
+        if !(x > -20.0 && y.hypot(z) < 3.7) {
+            balls.push(ball([x, y, z], [1.52, 1.55, 1.7][rng.below(3)]));
+        }
+    }
+    for method in [
+        Method::Approximate,
+        Method::Conservative,
+        Method::Exact,
+        Method::Balls(4),
+    ] {
+        let params = Params {
+            method,
+            count: 1,
+            whole: 20_000,
+            ..Params::DEFAULT
+        };
+        let part = solve(&balls, [-10.0, 0.0, 0.0], &params);
+        assert!(
+            part.searched.atoms < balls.len() as u64 / 2,
+            "{method:?}: {:?}",
+            part.searched
+        );
+        if !matches!(method, Method::Approximate | Method::Conservative) {
+            continue;
+        }
+        let whole = solve(
+            &balls,
+            [-10.0, 0.0, 0.0],
+            &Params {
+                whole: usize::MAX,
+                ..params
+            },
+        );
+        assert_eq!(whole.searched.atoms, balls.len() as u64);
+        assert!(
+            length(sub(part.start.used, whole.start.used)) < 1e-9,
+            "{method:?}"
+        );
+        let (a, b) = (part.widest.expect("a way"), whole.widest.expect("a way"));
+        assert!(
+            (a.width - b.width).abs() < 1e-6 && (a.upper - b.upper).abs() < 1e-6,
+            "{a:?} {b:?}"
+        );
+    }
+}
+
+#[test]
 fn the_start_is_the_widest_place_near() {
     let balls = crystal(&[[0.0; 3]], 7, 6.0, 1.7);
     let given = [16.5, 20.2, 21.9];

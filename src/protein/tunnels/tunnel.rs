@@ -126,7 +126,9 @@ pub fn centreline(graph: &mut Graph, route: &Route, outside: &Outside) -> Vec<[f
         }
     }
     points.dedup();
-    cut_at_hull(graph, &mut points);
+    if outside.is_whole() {
+        cut_at_hull(graph, &mut points);
+    }
     points
 }
 
