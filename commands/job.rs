@@ -322,12 +322,6 @@ impl<'a> Job<'a> {
         self.write_also(Extra::PREVIEW.option, |progress, _| draw(progress));
     }
 
-    /// The format in which what an option names is to be written, if the user wants it.
-    pub fn wants(&self, option: &str) -> Option<&'static str> {
-        let wanted = self.extras.iter().find(|beside| beside.option == option);
-        wanted.map(|beside| beside.format)
-    }
-
     /// The file that the result is written to, if it goes to one.
     pub fn output_path(&self) -> Option<&Path> {
         let sink = self.output.as_ref().map(|target| &target.place.sink);
