@@ -1,5 +1,6 @@
 //! `scantle tunnels`: the widest ways from inside a molecule to the outside.
 
+mod frames;
 mod result;
 
 use crate::context::{Context, Files};
@@ -7,6 +8,7 @@ use crate::exit::Exit;
 use crate::job::{Found, Job};
 use crate::shared::{Common, Inputs, MaxError, Output, Verify, named, not_negative, positive};
 use clap::{ArgGroup, value_parser};
+use frames::Frames;
 use result::{Solved, Stats, Verified};
 use scantle::error::{At, Error, Result};
 use scantle::io::format::Kind;
@@ -16,8 +18,10 @@ use scantle::protein::Molecule;
 use scantle::protein::radii::Radii;
 use scantle::protein::select::{SelectParams, Selected, SelectionCounts};
 use scantle::protein::start::Start;
+use scantle::protein::tunnels::pores::pores;
 use scantle::protein::tunnels::{
-    Exit as WayOut, Extent, Method, Params, Prefer, Removal, TRADE, find,
+    Exit as WayOut, Extent, Method, Params, Prefer, Removal, Searched, Start as Place, TRADE,
+    Tunnel, Widest, find,
 };
 use scantle::report::{Accuracy, Measures, Modelled};
 use schemars::JsonSchema;
@@ -46,6 +50,9 @@ pub struct Args {
     /// Start in the middle of this ligand, such as HEM or HEM:A:401, which is left out
     #[arg(long, value_name = "NAME", group = "from", value_parser = Start::ligand)]
     start_ligand: Option<Start>,
+    /// Find pores instead, from mouth to mouth through the molecule
+    #[arg(long, group = "from")]
+    pores: bool,
     /// Look for the widest place to start within this distance; 0 holds the start
     #[arg(long, value_name = "R", default_value_t = Params::DEFAULT.start_search, value_parser = not_negative)]
     start_search: f64,
@@ -58,9 +65,9 @@ pub struct Args {
     /// `hull`, behind the convex hull
     #[arg(long, default_value = Params::DEFAULT.exit.name(), value_parser = named(WayOut::NAMES, WayOut::from_name))]
     exit: WayOut,
-    /// Radius of the probe that tells the solvent from the molecule
-    #[arg(long, value_name = "R", default_value_t = Params::DEFAULT.shell_radius, value_parser = positive)]
-    shell_radius: f64,
+    /// Radius of the probe that tells the solvent from the molecule [default: 3, and 4 for pores]
+    #[arg(long, value_name = "R", value_parser = positive)]
+    shell_radius: Option<f64>,
     /// Find no tunnels narrower than this
     #[arg(long, value_name = "R", default_value_t = Params::DEFAULT.probe_radius, value_parser = not_negative)]
     probe_radius: f64,
@@ -71,7 +78,8 @@ pub struct Args {
     /// narrowest to the surface; `c`, the narrowest and those around
     #[arg(long, default_value = Params::DEFAULT.removal.name(), value_parser = named(Removal::NAMES, Removal::from_name))]
     remove: Removal,
-    /// Tunnels that end so near one another have one mouth, of which the widest is kept
+    /// Tunnels that end so near one another have one mouth, of which the widest is kept; with --pores,
+    /// mouths are so deep, too
     #[arg(long, value_name = "R", default_value_t = Params::DEFAULT.mouth, value_parser = not_negative)]
     mouth: f64,
     /// Of ways that are as wide, take the one of least `length`, or of least `cost`, the integral of
@@ -96,6 +104,12 @@ pub struct Args {
     /// Which models of a file: `first`, `all`, or one by its number
     #[arg(long, default_value = "first", value_parser = models)]
     models: Models,
+    /// Tell which tunnels are the same in all frames, and how wide each is over time, in a JSON file
+    #[arg(long, value_name = "FILE")]
+    clusters: Option<String>,
+    /// Tunnels further apart than this, on average, are not the same
+    #[arg(long, value_name = "D", default_value_t = 3.5, value_parser = positive, requires = "clusters")]
+    cluster_threshold: f64,
     #[command(flatten)]
     output: Output,
     #[command(flatten)]
@@ -142,13 +156,18 @@ fn method(name: &str) -> Result<Method, String> {
     })
 }
 
+/// The solvent's probe for pores, whose mouths are wider than those of tunnels.
+const PORES_SHELL: f64 = 4.0;
+
 /// What was asked for.
 #[derive(Debug, Serialize, JsonSchema)]
 pub struct Asked {
-    /// The start, in the words of its option.
-    start: String,
-    /// The option that it was given with.
-    start_option: String,
+    /// The start, in the words of its option; null for pores.
+    start: Option<String>,
+    /// The option that it was given with; null for pores.
+    start_option: Option<String>,
+    /// Whether pores were looked for.
+    pores: bool,
     /// How far from it a wider place was looked for.
     start_search: f64,
     /// How widths were found.
@@ -185,15 +204,14 @@ pub struct Asked {
 pub type Report = scantle::report::Report<Asked, Stats>;
 
 impl Args {
-    fn from(&self) -> &Start {
+    fn from(&self) -> Option<&Start> {
         let given = [
             &self.start,
             &self.start_residues,
             &self.start_atoms,
             &self.start_ligand,
         ];
-        let given = given.into_iter().flatten().next();
-        given.expect("the parser asks for one")
+        given.into_iter().flatten().next()
     }
 
     fn params(&self, memory: u64) -> Params {
@@ -202,7 +220,10 @@ impl Args {
             exit: self.exit,
             start_search: self.start_search,
             probe_radius: self.probe_radius,
-            shell_radius: self.shell_radius,
+            shell_radius: self.shell_radius.unwrap_or(match self.pores {
+                true => PORES_SHELL,
+                false => Params::DEFAULT.shell_radius,
+            }),
             mouth: self.mouth,
             count: self.count as usize,
             removal: self.remove,
@@ -215,15 +236,16 @@ impl Args {
         }
     }
 
-    fn asked(&self) -> Asked {
+    fn asked(&self, params: &Params) -> Asked {
         let start = self.from();
         Asked {
-            start: start.to_string(),
-            start_option: start.option().to_owned(),
+            start: start.map(Start::to_string),
+            start_option: start.map(|start| start.option().to_owned()),
+            pores: self.pores,
             start_search: self.start_search,
             method: self.method.name(),
             exit: self.exit.name().to_owned(),
-            shell_radius: (self.exit == WayOut::Shell).then_some(self.shell_radius),
+            shell_radius: (self.exit == WayOut::Shell).then_some(params.shell_radius),
             probe_radius: self.probe_radius,
             count: self.count,
             remove: self.remove.name().to_owned(),
@@ -260,14 +282,30 @@ pub fn run(args: &Args) -> Result<Exit> {
         }
     };
     let files = Files::each(&args.inputs).output(&args.output);
-    context.run("tunnels", &files, |job| tunnels(job, &params, args, &radii))
+    let frames = args
+        .clusters
+        .as_deref()
+        .map(|word| Frames::new(word, args.cluster_threshold, &args.inputs, context.memory()))
+        .transpose()?;
+    let exit = context.run("tunnels", &files, |job| {
+        tunnels(job, &params, args, &radii, frames.as_ref())
+    })?;
+    frames.map_or(Ok(()), Frames::write)?;
+    Ok(exit)
 }
 
 /// One model's atoms that count, and what was found between them.
 pub(crate) struct Model {
     number: i32,
     selected: Selected,
-    found: scantle::protein::tunnels::Tunnels,
+    /// Where ways start; none for pores.
+    start: Option<Place>,
+    widest: Option<Widest>,
+    tunnels: Vec<Tunnel>,
+    merged: u64,
+    /// Mouths, for pores.
+    mouths: Option<u64>,
+    searched: Searched,
 }
 
 fn tunnels(
@@ -275,6 +313,7 @@ fn tunnels(
     params: &Params,
     args: &Args,
     radii: &Radii,
+    frames: Option<&Frames>,
 ) -> Result<Found<Asked, Stats>> {
     job.expect_output(&[Kind::Molecule])?;
     let molecule = job.read_molecule()?;
@@ -283,13 +322,16 @@ fn tunnels(
     for index in chosen(&molecule, args.models)? {
         let model = solve(job, &molecule, index, params, args, radii)?;
         solved.push(Solved::new(&molecule, &model));
+        if let (Some(frames), Some(input)) = (frames, job.input()) {
+            frames.add(&input.path, &model);
+        }
         first.get_or_insert(model);
     }
     let Some(model) = first else {
         unreachable!("at least one model is chosen");
     };
     job.warn(model.selected.warnings());
-    job.warn(result::warnings(&model.found, params));
+    job.warn(result::warnings(&model, params));
     let summary = result::summary(&model);
     let verified = match args.verify.verify {
         true => verify(job, &model, params)?,
@@ -298,7 +340,7 @@ fn tunnels(
     job.warn(result::doubts(verified.as_ref()));
     let accuracy = accuracy(&model, verified.as_ref());
     let counts: &SelectionCounts = &model.selected.counts;
-    let searched = model.found.searched;
+    let searched = model.searched;
     let made = Modelled::new("atom", searched.atoms, counts.atoms_used, searched.bytes);
     let mut found = solved.into_iter();
     let own = found.next().expect("at least one model is chosen");
@@ -309,7 +351,7 @@ fn tunnels(
         verified,
         other_models: models,
     };
-    let found = Found::new(args.asked(), stats, summary).modelled(made);
+    let found = Found::new(args.asked(params), stats, summary).modelled(made);
     Ok(found
         .accuracy(accuracy)
         .check("max-error", args.max_error.max_error))
@@ -340,19 +382,49 @@ fn solve(
     args: &Args,
     radii: &Radii,
 ) -> Result<Model> {
-    let start = args.from().resolve(molecule, index)?;
+    let start = match args.from() {
+        Some(from) => Some(from.resolve(molecule, index)?),
+        None => None,
+    };
     let select = SelectParams {
         keep: args.keep.clone(),
-        drop: start.drop,
+        drop: start.as_ref().map_or(vec![], |start| start.drop.clone()),
         radii: radii.clone(),
     };
     let selected = Selected::of(molecule, index, &select)?;
+    let number = molecule.models[index].number;
+    let Some(start) = start else {
+        let found = pores(&selected.balls, params, job.progress())?;
+        let atoms = selected.balls.len() as u64;
+        return Ok(Model {
+            number,
+            selected,
+            start: None,
+            widest: None,
+            tunnels: found.pores,
+            merged: 0,
+            mouths: Some(found.mouths),
+            searched: Searched {
+                cells: found.cells,
+                gates: found.gates,
+                triangulations: 1,
+                atoms,
+                bytes: found.bytes,
+                ..Searched::default()
+            },
+        });
+    };
     let found = find(&selected.balls, start.position, params, job.progress());
     let found = found.map_err(|error| named_atom(error, molecule, &selected))?;
     Ok(Model {
-        number: molecule.models[index].number,
+        number,
         selected,
-        found,
+        start: Some(found.start),
+        widest: found.widest,
+        tunnels: found.tunnels,
+        merged: found.merged,
+        mouths: None,
+        searched: found.searched,
     })
 }
 
@@ -382,10 +454,9 @@ const OCTREE: f64 = 0.005;
 /// Finds the exact width of the widest way, and asks an octree, which shares nothing with that, whether it is
 /// right.
 fn verify(job: &Job, model: &Model, params: &Params) -> Result<Option<Verified>> {
-    let start = &model.found.start;
-    if model.found.widest.is_none() {
+    let (Some(start), Some(_)) = (&model.start, &model.widest) else {
         return Ok(None);
-    }
+    };
     job.progress().stage("verify", 0);
     let exact = Params {
         method: Method::Exact,
@@ -401,7 +472,7 @@ fn verify(job: &Job, model: &Model, params: &Params) -> Result<Option<Verified>>
 }
 
 fn accuracy(model: &Model, verified: Option<&Verified>) -> Measures {
-    let widest = model.found.widest.as_ref();
+    let widest = model.widest.as_ref();
     let above = |upper: f64| widest.map(|w| (upper - w.narrowest.radius).max(0.0));
     Measures::One(Accuracy {
         measure: TRADE.error.name.to_owned(),

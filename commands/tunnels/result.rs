@@ -3,7 +3,7 @@
 use super::Model;
 use scantle::measure::passage::Passage;
 use scantle::protein::select::SelectionCounts;
-use scantle::protein::tunnels::{Narrowest, Params, Stop, Tunnel, Tunnels, Widest};
+use scantle::protein::tunnels::{Narrowest, Params, Stop, Tunnel, Widest};
 use scantle::protein::{Molecule, Residue};
 use scantle::report::Warning;
 use schemars::JsonSchema;
@@ -71,13 +71,16 @@ pub struct Solved {
     /// What was selected.
     selection: SelectionCounts,
     /// Where ways start.
-    start: StartUsed,
-    /// The widest way out, narrower than the probe or not; null where nothing is enclosed.
+    /// Null for pores.
+    start: Option<StartUsed>,
+    /// The widest way out, narrower than the probe or not; null for pores, and where nothing is enclosed.
     widest: Option<Bottleneck>,
-    /// Tunnels, the widest first.
+    /// Tunnels, or pores, the widest first.
     tunnels: Vec<TunnelFound>,
     /// Ways left out because their mouth or their course is that of a wider one.
     merged: u64,
+    /// Mouths that ways as wide as the probe lead to; null but for pores.
+    mouths: Option<u64>,
     /// What was searched.
     graph: Searched,
 }
@@ -248,34 +251,30 @@ impl Solved {
             molecule,
             atoms: &model.selected.atoms,
         };
-        let Tunnels {
-            start,
-            widest,
-            tunnels,
-            merged,
-            searched,
-        } = &model.found;
-        let upper = widest.as_ref().map(|w| w.upper);
+        let widest = model.widest.as_ref();
+        let upper = widest.map(|w| w.upper);
         let found =
             |(rank, tunnel): (usize, &Tunnel)| names.tunnel(tunnel, upper.filter(|_| rank == 0));
+        let searched = &model.searched;
         Solved {
             model: model.number,
             selection: model.selected.counts.clone(),
-            start: StartUsed {
+            start: model.start.map(|start| StartUsed {
                 given: start.given,
                 used: start.used,
                 clearance: start.clearance,
-                limited: widest.as_ref().is_some_and(|w| w.lower >= start.clearance),
-            },
-            widest: widest.as_ref().map(|w| {
+                limited: widest.is_some_and(|w| w.lower >= start.clearance),
+            }),
+            widest: widest.map(|w| {
                 let own = names.bottleneck(&w.narrowest, w.width, upper);
                 Bottleneck {
                     lower: w.lower,
                     ..own
                 }
             }),
-            tunnels: tunnels.iter().enumerate().map(found).collect(),
-            merged: *merged,
+            tunnels: model.tunnels.iter().enumerate().map(found).collect(),
+            merged: model.merged,
+            mouths: model.mouths,
             graph: Searched {
                 cells: searched.cells,
                 gates: searched.gates,
@@ -289,10 +288,14 @@ impl Solved {
 
 /// A few words for a person.
 pub fn summary(model: &Model) -> String {
-    let found = &model.found;
-    let count = found.tunnels.len();
+    let count = model.tunnels.len();
     let plural = if count == 1 { "" } else { "s" };
-    match &found.widest {
+    match &model.widest {
+        None if model.mouths.is_some() => {
+            let widest = model.tunnels.first().map(|pore| pore.narrowest.radius);
+            let widest = widest.map_or(String::new(), |w| format!(", the widest {w:.4}"));
+            format!("{count} pore{plural}{widest}")
+        }
         None => "no space is enclosed".to_owned(),
         Some(w) if count == 0 => format!("closed: the widest way out has radius {:.4}", w.width),
         Some(Widest {
@@ -309,10 +312,10 @@ pub fn summary(model: &Model) -> String {
 }
 
 /// What looks wrong with what was found.
-pub fn warnings(found: &Tunnels, params: &Params) -> Vec<Warning> {
+pub fn warnings(found: &Model, params: &Params) -> Vec<Warning> {
     let mut warnings = Vec::new();
     match &found.widest {
-        None => warnings.push(Warning::new(
+        None if found.mouths.is_none() => warnings.push(Warning::new(
             "nothing-enclosed",
             "the atoms enclose no space: they are fewer than four, or lie in one plane",
             1,
@@ -325,7 +328,7 @@ pub fn warnings(found: &Tunnels, params: &Params) -> Vec<Warning> {
             );
             warnings.push(Warning::new("closed", message, 1, None));
         }
-        Some(_) => {}
+        _ => {}
     }
     warnings
 }
