@@ -60,7 +60,7 @@ pub fn plot(
         ..Series::new("", 0, narrowest)
     });
     for (rank, tunnel) in drawn.iter().enumerate() {
-        let name = format!("{}: {:.3} Å", rank + 1, tunnel.narrowest.radius);
+        let name = format!("tunnel {}: {:.3} Å", rank + 1, tunnel.narrowest.radius);
         let share = rank as f64 / drawn.len() as f64;
         let marked = marked(tunnel, longest / MARKERS, share);
         plot.series.push(Series::new(name, rank, marked));
@@ -153,7 +153,7 @@ mod tests {
             assert!(marked.points.iter().all(|p| line.points.contains(p)));
             let least = tunnel.narrowest.radius;
             assert!((rings[rank].y - least).abs() < 1e-12);
-            assert_eq!(marked.name, format!("{}: {least:.3} Å", rank + 1));
+            assert_eq!(marked.name, format!("tunnel {}: {least:.3} Å", rank + 1));
         }
         let svg = plot.svg();
         assert!(

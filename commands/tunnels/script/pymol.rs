@@ -87,7 +87,7 @@ fn lining(text: &mut String, scene: &Scene) {
     }
     if !scene.tunnels.is_empty() {
         text.push_str("show sticks, lining_1 and not (polymer and name C+N+O)\n");
-        text.push_str("util.cnc lining_1\nset label_color, black\nset label_size, 18\n");
+        text.push_str("util.cnc lining_1\nset label_color, black\nset label_size, 18\nset label_position, [0, 0, 10]\n");
     }
     for residue in scene.narrowest() {
         let one = selection(&[residue]);
