@@ -19,8 +19,10 @@ pub struct Wrapped {
     matches: ArgMatches,
 }
 
-/// Options that the wrapping command sets itself.
-const TAKEN: &[&str] = &["output", "preview", "timings", "verify"];
+/// Options that the wrapping command sets itself, or that would have every run write over one file.
+const TAKEN: &[&str] = &[
+    "output", "preview", "profile", "script", "plot", "timings", "verify",
+];
 
 impl Wrapped {
     /// Takes the words of a command apart. Errs with what to say to the user.

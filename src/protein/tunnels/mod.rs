@@ -21,12 +21,15 @@
 mod balls;
 pub mod cluster;
 mod crop;
+pub mod cut;
 mod exact;
 pub mod graph;
 mod grid;
 mod params;
 pub mod pores;
 pub mod search;
+pub mod shape;
+mod solid;
 mod solve;
 mod sparse;
 mod start;
