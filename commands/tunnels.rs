@@ -19,6 +19,7 @@ use scantle::protein::radii::Radii;
 use scantle::protein::select::{SelectParams, Selected, SelectionCounts};
 use scantle::protein::start::Start;
 use scantle::protein::tunnels::pores::pores;
+use scantle::protein::tunnels::shape;
 use scantle::protein::tunnels::{
     Exit as WayOut, Extent, Method, Params, Prefer, Removal, Searched, Start as Place, TRADE,
     Tunnel, Widest, find,
@@ -338,6 +339,9 @@ fn tunnels(
         false => None,
     };
     job.warn(result::doubts(verified.as_ref()));
+    if !model.tunnels.is_empty() {
+        job.write_molecule(&shape::spheres(&model.tunnels))?;
+    }
     let accuracy = accuracy(&model, verified.as_ref());
     let counts: &SelectionCounts = &model.selected.counts;
     let searched = model.searched;

@@ -8,6 +8,7 @@ use scantle::io::sink::Sink;
 use scantle::io::source::Source;
 use scantle::io::{read_mesh, read_molecule, write_mesh, write_molecule, write_volume};
 use scantle::mesh::{Mesh, shapes};
+use scantle::numeric::vector::{add, cross, dot, length, normalize, scale, sub};
 use scantle::progress::Silent;
 use scantle::protein::builder::{Builder, Place};
 use scantle::protein::{Atom, Element, Molecule, Name};
@@ -66,6 +67,7 @@ const MOLECULES: &[Row<Molecule>] = &[
     ("molecules/helix.cif", helix_of_atoms),
     ("molecules/ring.xyzr", ring_of_spheres),
     ("molecules/ring.csv", ring_of_spheres),
+    ("molecules/porthole.xyzr", portholes),
 ];
 
 /// An atom as a molecule has it: its place and name in a residue, an element and a letter.
@@ -188,6 +190,71 @@ fn ring_of_spheres() -> Molecule {
             ..atom([4.0 * cos, 4.0 * sin, 0.0], "", "", false)
         };
         builder.push(&at_place("", "", 0), sphere).expect("room");
+    }
+    builder.finish()
+}
+
+/// Portholes: the way out through each, and its radius.
+const PORTHOLES: [([f64; 3], f64); 3] = [
+    ([0.9, 0.2, 0.3], 2.0),
+    ([-0.6, 0.8, -0.2], 1.6),
+    ([-0.1, -0.5, -1.0], 1.2),
+];
+
+/// Radii of the atoms around them, in turn.
+const OF_A_HULL: [f64; 5] = [1.7, 1.52, 1.55, 1.7, 1.8];
+
+/// Two layers of atoms around the origin, closed but for round portholes. Three atoms of the rim of each
+/// touch a circle of its radius in both layers; the others stand back.
+fn portholes() -> Molecule {
+    let mut builder = Builder::default();
+    let mut put = |centre: [f64; 3], radius: f64| {
+        let sphere = Atom {
+            radius: Some(radius),
+            serial: builder.len() as i64 + 1,
+            ..atom(centre, "", "", false)
+        };
+        builder.push(&at_place("", "", 0), sphere).expect("room");
+    };
+    for (layer, count, out) in [(0.0, 330, 9.5), (1.0, 410, 11.4)] {
+        for k in 0..count {
+            // A spiral of equal steps in height, turned by the golden angle, with bumps.
+            let (at, radius) = (f64::from(k), OF_A_HULL[k as usize % OF_A_HULL.len()]);
+            let z = 1.0 - (2.0 * at + 1.0) / f64::from(count);
+            let (sin, cos) = (2.399_963_229_728_653 * at + layer).sin_cos();
+            let around = (1.0 - z * z).sqrt();
+            let bumpy = out + 0.25 * (3.1 * at).sin();
+            let centre = scale([around * cos, around * sin, z], bumpy);
+            let is_open = PORTHOLES.iter().any(|(way, hole)| {
+                let along = dot(centre, normalize(*way));
+                let off = sub(centre, scale(normalize(*way), along));
+                along > 0.0 && length(off) < hole + radius + 0.9
+            });
+            if !is_open {
+                put(centre, radius);
+            }
+        }
+        for (way, hole) in PORTHOLES {
+            let axis = normalize(way);
+            let across = normalize(cross(axis, [0.0, 0.0, 1.0]));
+            let sides = [across, cross(axis, across)];
+            let count = 3 * ((hole + 1.65) * std::f64::consts::TAU / 4.5).ceil() as u32;
+            for k in 0..count {
+                let radius = OF_A_HULL[k as usize % OF_A_HULL.len()];
+                let angle = std::f64::consts::TAU * f64::from(k) / f64::from(count) + layer;
+                let (back, up) = match k % (count / 3) {
+                    0 => (0.0, 0.0),
+                    _ => (0.15 + 0.1 * angle.sin(), 0.3 * (2.3 * f64::from(k)).sin()),
+                };
+                let off = hole + radius + back;
+                let foot = scale(axis, out + up);
+                let aside = add(
+                    scale(sides[0], off * angle.cos()),
+                    scale(sides[1], off * angle.sin()),
+                );
+                put(add(foot, aside), radius);
+            }
+        }
     }
     builder.finish()
 }
