@@ -94,7 +94,9 @@ pub fn write(job: &mut Job, found: &Found) -> Result<()> {
         Ok(drawn(&plot, format))
     });
     let has_radii = job.output_format().is_some_and(script::holds_radii);
-    let spheres = job.output_path().filter(|_| has_radii && !tunnels.is_empty());
+    let spheres = job
+        .output_path()
+        .filter(|_| has_radii && !tunnels.is_empty());
     let spheres = spheres.map(|path| path.display().to_string());
     let scene = Scene {
         structure: is_shown.then_some(&*path),
