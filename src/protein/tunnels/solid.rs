@@ -63,6 +63,12 @@ impl Lattice {
         })
     }
 
+    /// The lattice moved down along all axes, by a share of the spacing from 0 to below 1.
+    pub fn moved(mut self, share: f64) -> Self {
+        self.origin = self.origin.map(|c| c - share * self.spacing);
+        self
+    }
+
     /// Bytes that the surface of a solid of this area takes while it is made.
     pub fn bytes(&self, area: f64) -> u128 {
         let vertices = VERTICES * area / (self.spacing * self.spacing);
