@@ -108,3 +108,26 @@ fn places_that_cannot_be_are_refused_before_the_work() {
     }
     assert_eq!(place.names(), ["a.pdb", "b"]);
 }
+
+#[test]
+fn one_entry_in_two_formats_has_one_result() {
+    let place = Workplace::new();
+    let result = |file: &str| {
+        let file = crate::support::root().join("fixtures/molecules").join(file);
+        let line = format!(
+            "tunnels {} --start-residues A:4 --keep HOH --probe-radius 0.1 --report r.json -q",
+            file.display()
+        );
+        assert_eq!(place.run(&line).code, 0);
+        let report = fs::read(place.path("r.json")).expect("a report");
+        let report: serde_json::Value = serde_json::from_slice(&report).expect("JSON");
+        assert!(
+            !report["result"]["tunnels"]
+                .as_array()
+                .expect("a list")
+                .is_empty()
+        );
+        report["result"].clone()
+    };
+    assert_eq!(result("helix.pdb"), result("helix.cif"));
+}
