@@ -1,6 +1,6 @@
 //! What a command works in: threads, memory, and the reports of its jobs.
 
-use crate::destination::{self, Destination, Reads, Target, Writes};
+use crate::destination::{self, Beside, Destination, Extra, Reads, Target, Writes};
 use crate::exit::Exit;
 use crate::job::{Found, Job};
 use crate::machine::{self, Moment};
@@ -29,7 +29,7 @@ pub struct Files<'a> {
     format: Option<Format>,
     together: bool,
     output: Option<&'a Output>,
-    preview: Option<&'a Preview>,
+    extras: Vec<(Extra, &'a str)>,
     labelled: bool,
 }
 
@@ -49,7 +49,7 @@ impl<'a> Files<'a> {
             format: format.input_format,
             together: true,
             output: None,
-            preview: None,
+            extras: Vec::new(),
             labelled: false,
         }
     }
@@ -67,8 +67,16 @@ impl<'a> Files<'a> {
     }
 
     /// With a picture, where the user wants one.
-    pub fn preview(mut self, preview: &'a Preview) -> Self {
-        self.preview = Some(preview);
+    pub fn preview(self, preview: &'a Preview) -> Self {
+        self.also(Extra::PREVIEW, &preview.preview)
+    }
+
+    /// With something else beside the result, where the user wants it: the word of its option.
+    ///
+    /// [`Job::write_also`] writes it.
+    pub fn also(mut self, extra: Extra, word: &'a Option<String>) -> Self {
+        self.extras
+            .extend(word.as_deref().map(|word| (extra, word)));
         self
     }
 
@@ -114,35 +122,17 @@ impl<'a> Files<'a> {
             .map(Some)
     }
 
-    fn plan_previews(&self) -> Result<Option<Vec<Destination>>> {
-        match self.preview.and_then(|preview| preview.preview.as_deref()) {
-            None => Ok(None),
-            Some("-") => Err(Error::parameter(
-                "preview",
-                "-",
-                "a picture goes to a file, not to standard output",
-            )),
-            Some(word) => {
-                let planned =
-                    destination::plan("preview", word, Some("png"), &self.names(), false)?;
-                planned
-                    .iter()
-                    .try_for_each(|place| check_preview(word, &place.sink))?;
-                Ok(Some(planned))
+    /// What is written beside the result of each job.
+    fn plan_extras(&self) -> Result<Vec<Vec<Beside>>> {
+        let names = self.names();
+        let mut planned = vec![Vec::with_capacity(self.extras.len()); names.len()];
+        for (extra, word) in &self.extras {
+            for (all, beside) in planned.iter_mut().zip(extra.plan(word, &names)?) {
+                all.push(beside);
             }
         }
+        Ok(planned)
     }
-}
-
-/// Errs where the name of a picture asks for another format than it has. A device may have no
-/// extension.
-fn check_preview(word: &str, sink: &Sink) -> Result<()> {
-    let extension = sink.path().extension();
-    if extension.is_none_or(|e| e.eq_ignore_ascii_case("png")) {
-        return Ok(());
-    }
-    let problem = "a preview is a PNG picture, and its name must end in .png";
-    Err(Error::parameter("preview", word, problem))
 }
 
 /// The format to write: as asked, or as the name tells.
@@ -207,19 +197,13 @@ impl<'a> Context<'a> {
     {
         let jobs = files.jobs();
         let outputs = files.plan_outputs()?;
-        let previews = files.plan_previews()?;
+        let extras = files.plan_extras()?;
         let report = self.report_sink(outputs.as_deref())?;
         let memory = self.memory;
-        refuse_conflicts(
-            files,
-            memory,
-            outputs.as_deref(),
-            previews.as_deref(),
-            &report,
-        )?;
+        refuse_conflicts(files, memory, outputs.as_deref(), &extras, &report)?;
         let results = outputs.iter().flatten().map(|target| &target.place);
         results
-            .chain(previews.iter().flatten())
+            .chain(extras.iter().flatten().map(|beside| &beside.place))
             .try_for_each(Destination::check)?;
         report.iter().try_for_each(destination::check_place)?;
 
@@ -227,11 +211,10 @@ impl<'a> Context<'a> {
         let start = Cell::new(self.start);
         let mut lines = Vec::new();
         let mut worst = Exit::Done;
-        for (index, inputs) in jobs.iter().enumerate() {
+        for ((index, inputs), extras) in jobs.iter().enumerate().zip(extras) {
             let output = outputs.as_ref().map(|all| all[index].clone());
-            let preview = previews.as_ref().map(|all| all[index].clone());
             let mut job = Job::new(self, inputs, files.format, start.get(), with_bar);
-            job.send_to(output, preview);
+            job.send_to(output, extras);
             let found = self.pool.install(|| work(&mut job));
             worst = worst.max(match found {
                 Err(error) => job.fail(error),
@@ -284,7 +267,7 @@ fn refuse_conflicts(
     files: &Files,
     memory: u64,
     outputs: Option<&[Target]>,
-    previews: Option<&[Destination]>,
+    extras: &[Vec<Beside>],
     report: &Option<Sink>,
 ) -> Result<()> {
     if files.inputs.iter().filter(|input| *input == "-").count() > 1 {
@@ -292,7 +275,7 @@ fn refuse_conflicts(
         return Err(Error::parameter("input", "-", problem));
     }
     let outputs = outputs.into_iter().flatten();
-    let previews = previews.into_iter().flatten();
+    let extras = extras.iter().flatten();
     let place = |option, sink, format| Writes {
         option,
         sink,
@@ -300,7 +283,7 @@ fn refuse_conflicts(
     };
     let written: Vec<_> = outputs
         .map(|to| place("output", &to.place.sink, Some(to.format)))
-        .chain(previews.map(|to| place("preview", &to.sink, None)))
+        .chain(extras.map(|to| place(to.option, &to.place.sink, None)))
         .chain(report.iter().map(|sink| place("report", sink, None)))
         .collect();
     let reads = Reads {

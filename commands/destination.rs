@@ -1,4 +1,4 @@
-//! Where results go: `-o` and `--preview` made into one file per input.
+//! Where results go: `-o`, `--preview` and their like made into one file per input.
 
 use scantle::error::{Error, Result};
 use scantle::io;
@@ -28,6 +28,88 @@ pub struct Target {
     pub format: Format,
     /// Whether the user named the format; else the name of the file tells it.
     pub is_named: bool,
+}
+
+/// What an option may have written beside the result: a picture, a table.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Extra {
+    /// The option, without dashes.
+    pub option: &'static str,
+    /// What it is in a word: `a picture`.
+    pub what: &'static str,
+    /// What it is exactly: `a PNG picture`.
+    pub exactly: &'static str,
+    /// Its formats, which are the extensions of its names too; the first is taken in a folder.
+    pub formats: &'static [&'static str],
+}
+
+impl Extra {
+    /// The picture of `--preview`.
+    pub const PREVIEW: Extra = Extra {
+        option: "preview",
+        what: "a picture",
+        exactly: "a PNG picture",
+        formats: &["png"],
+    };
+
+    /// One destination per input for the word of the option.
+    ///
+    /// Errs for standard output, which carries the result or the report, and where a name asks for another
+    /// format than there is. Where there is one format alone, a name without an extension is right: a device
+    /// has none.
+    pub fn plan(&self, word: &str, inputs: &[String]) -> Result<Vec<Beside>> {
+        let wrong = |problem| Error::parameter(self.option, word, problem);
+        if word == "-" {
+            let problem = format!("{} goes to a file, not to standard output", self.what);
+            return Err(wrong(problem));
+        }
+        let planned = plan(
+            self.option,
+            word,
+            self.formats.first().copied(),
+            inputs,
+            false,
+        )?;
+        let beside = |place: Destination| {
+            let format = self.format_of(place.sink.path()).ok_or_else(|| {
+                let (option, exactly) = (self.option, self.exactly);
+                let endings: Vec<String> = self.formats.iter().map(|f| format!(".{f}")).collect();
+                let endings = endings.join(" or ");
+                wrong(format!(
+                    "a {option} is {exactly}, and its name must end in {endings}"
+                ))
+            })?;
+            Ok(Beside {
+                option: self.option,
+                format,
+                place,
+            })
+        };
+        planned.into_iter().map(beside).collect()
+    }
+
+    /// The format that a name asks for.
+    fn format_of(&self, path: &Path) -> Option<&'static str> {
+        match (path.extension(), self.formats) {
+            (None, [only]) => Some(only),
+            (None, _) => None,
+            (Some(extension), formats) => {
+                let is_it = |format: &&&str| extension.eq_ignore_ascii_case(format);
+                formats.iter().find(is_it).copied()
+            }
+        }
+    }
+}
+
+/// Where and as what an [`Extra`] of one input is written.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Beside {
+    /// The option, without dashes.
+    pub option: &'static str,
+    /// The format, as the report names it.
+    pub format: &'static str,
+    /// Where.
+    pub place: Destination,
 }
 
 impl Target {
@@ -318,6 +400,52 @@ mod tests {
             ["out/a.stl", "out/b.stl"]
         );
         assert_eq!(paths("{stem}.ply", None, &["-"]).unwrap(), ["stdin.ply"]);
+    }
+
+    #[test]
+    fn extras_are_what_their_names_say() {
+        const PLOT: Extra = Extra {
+            option: "plot",
+            what: "a picture",
+            exactly: "an SVG or PNG picture",
+            formats: &["svg", "png"],
+        };
+        let inputs = ["a/x.pdb", "y.cif.gz"].map(str::to_owned);
+        let planned = |extra: Extra, word: &str, count: usize| {
+            let planned = extra.plan(word, &inputs[..count])?;
+            let said = planned.iter().map(|beside| {
+                let path = beside.place.sink.path().display();
+                format!("{} {path}", beside.format)
+            });
+            Ok::<_, Error>(said.collect::<Vec<_>>())
+        };
+        let two = planned(PLOT, "out/{stem}.PNG", 2).expect("two places");
+        assert_eq!(two, ["png out/x.PNG", "png out/y.PNG"]);
+        let two = planned(PLOT, "out/", 2).expect("two places");
+        assert_eq!(two, ["svg out/x.svg", "svg out/y.svg"]);
+        let device = planned(Extra::PREVIEW, "/dev/null", 1).expect("a place");
+        assert_eq!(device, ["png /dev/null"]);
+        let message = |word, count| {
+            planned(PLOT, word, count)
+                .expect_err("an error")
+                .to_string()
+        };
+        for word in ["a.pdf", "a"] {
+            assert_eq!(
+                message(word, 1),
+                format!(
+                    "--plot {word}: a plot is an SVG or PNG picture, and its name must end in .svg or .png"
+                )
+            );
+        }
+        assert_eq!(
+            message("-", 1),
+            "--plot -: a picture goes to a file, not to standard output"
+        );
+        assert_eq!(
+            message("a.svg", 2),
+            "--plot a.svg: one place for the results of 2 inputs; name a folder (out/) or use {stem}"
+        );
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! One job: what is read, made and written for one report.
 
 use crate::context::Context;
-use crate::destination::{Destination, Target};
+use crate::destination::{Beside, Extra, Target};
 use crate::exit::Exit;
 use crate::machine::{Moment, peak_bytes};
 use crate::progress::Recorder;
@@ -22,6 +22,7 @@ use scantle::report::{
 use scantle::volume::Volume;
 use serde::Serialize;
 use serde_json::Value;
+use std::path::Path;
 
 /// What stands for the label in the place of a result.
 const LABEL: &str = "{label}";
@@ -118,7 +119,7 @@ pub struct Job<'a> {
     words: &'a [String],
     format: Option<Format>,
     output: Option<Target>,
-    preview: Option<Destination>,
+    extras: Vec<Beside>,
     unwritten: Vec<Error>,
     recorder: Recorder,
     read: Vec<Input>,
@@ -140,7 +141,7 @@ impl<'a> Job<'a> {
             words,
             format,
             output: None,
-            preview: None,
+            extras: Vec::new(),
             unwritten: Vec::new(),
             recorder: Recorder::new(start, with_bar),
             read: Vec::new(),
@@ -150,9 +151,9 @@ impl<'a> Job<'a> {
         }
     }
 
-    pub(crate) fn send_to(&mut self, output: Option<Target>, preview: Option<Destination>) {
+    pub(crate) fn send_to(&mut self, output: Option<Target>, extras: Vec<Beside>) {
         self.output = output;
-        self.preview = preview;
+        self.extras = extras;
     }
 
     /// Who hears how far the work is.
@@ -316,20 +317,37 @@ impl<'a> Job<'a> {
         Ok(())
     }
 
-    /// Draws and writes a picture (the bytes of a PNG file), if the user wants one.
+    /// Draws and writes a picture (the bytes of a PNG file), if the user wants one; see [`Job::write_also`].
+    pub fn write_preview(&mut self, draw: impl FnOnce(&dyn Progress) -> Result<Vec<u8>>) {
+        self.write_also(Extra::PREVIEW.option, |progress, _| draw(progress));
+    }
+
+    /// The file that the result is written to, if it goes to one.
+    pub fn output_path(&self) -> Option<&Path> {
+        let sink = self.output.as_ref().map(|target| &target.place.sink);
+        sink.filter(|sink| **sink != Sink::Stdout).map(Sink::path)
+    }
+
+    /// Makes and writes what an option asks for beside the result (the bytes of the file, in the format
+    /// that is named), if the user wants it.
     ///
     /// Where that fails the job goes on: the result stands already, and its report is still due.
-    pub fn write_preview(&mut self, draw: impl FnOnce(&dyn Progress) -> Result<Vec<u8>>) {
-        let Some(place) = &self.preview else {
+    pub fn write_also(
+        &mut self,
+        option: &'static str,
+        make: impl FnOnce(&dyn Progress, &str) -> Result<Vec<u8>>,
+    ) {
+        let Some(beside) = self.extras.iter().find(|beside| beside.option == option) else {
             return;
         };
-        self.recorder.stage("preview", 0);
-        let drawn = draw(&self.recorder).and_then(|picture| {
+        self.recorder.stage(option, 0);
+        let made = make(&self.recorder, beside.format).and_then(|bytes| {
             self.recorder.stage("write", 0);
-            place.prepare()?;
-            place.sink.write_as("png", |out| out.write_all(&picture))
+            beside.place.prepare()?;
+            let sink = &beside.place.sink;
+            sink.write_as(beside.format, |out| out.write_all(&bytes))
         });
-        match drawn {
+        match made {
             Ok(output) => self.written.push(output),
             Err(error) => self.unwritten.push(error),
         }

@@ -33,6 +33,14 @@ impl Picture {
     }
 }
 
+/// A plot as the bytes of a file, `svg` or else `png`.
+pub fn drawn(plot: &Plot, format: &str) -> Vec<u8> {
+    match format {
+        "svg" => plot.svg().into_bytes(),
+        _ => plot.png(),
+    }
+}
+
 /// Where results go.
 pub struct Places {
     csv: Option<Sink>,
@@ -84,10 +92,7 @@ impl Places {
             Err(error) => exit = exit.max(complain(&error, None)),
         };
         if let Some(Picture { sink, name }) = &self.plot {
-            let drawn = match *name {
-                "svg" => plot().svg().into_bytes(),
-                _ => plot().png(),
-            };
+            let drawn = drawn(&plot(), name);
             keep(sink.write_as(name, |out| out.write_all(&drawn)));
         }
         if let Some(sink) = &self.csv {

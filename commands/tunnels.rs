@@ -1,7 +1,14 @@
 //! `scantle tunnels`: the widest ways from inside a molecule to the outside.
 
 mod frames;
+mod output;
+mod picture;
+mod plot;
+mod profile;
 mod result;
+#[cfg(test)]
+mod sample;
+mod script;
 
 use crate::context::{Context, Files};
 use crate::exit::Exit;
@@ -9,9 +16,9 @@ use crate::job::{Found, Job};
 use crate::shared::{Common, Inputs, MaxError, Output, Verify, named, not_negative, positive};
 use clap::{ArgGroup, value_parser};
 use frames::Frames;
+use output::Extras;
 use result::{Solved, Stats, Verified};
 use scantle::error::{At, Error, Result};
-use scantle::io::format::Kind;
 use scantle::io::source::Source;
 use scantle::measure::passage::passage;
 use scantle::protein::Molecule;
@@ -19,7 +26,6 @@ use scantle::protein::radii::Radii;
 use scantle::protein::select::{SelectParams, Selected, SelectionCounts};
 use scantle::protein::start::Start;
 use scantle::protein::tunnels::pores::pores;
-use scantle::protein::tunnels::shape;
 use scantle::protein::tunnels::{
     Exit as WayOut, Extent, Method, Params, Prefer, Removal, Searched, Start as Place, TRADE,
     Tunnel, Widest, find,
@@ -113,6 +119,8 @@ pub struct Args {
     cluster_threshold: f64,
     #[command(flatten)]
     output: Output,
+    #[command(flatten)]
+    extras: Extras,
     #[command(flatten)]
     max_error: MaxError,
     #[command(flatten)]
@@ -282,7 +290,9 @@ pub fn run(args: &Args) -> Result<Exit> {
             })?
         }
     };
-    let files = Files::each(&args.inputs).output(&args.output);
+    let files = args
+        .extras
+        .of(Files::each(&args.inputs).output(&args.output));
     let frames = args
         .clusters
         .as_deref()
@@ -316,7 +326,7 @@ fn tunnels(
     radii: &Radii,
     frames: Option<&Frames>,
 ) -> Result<Found<Asked, Stats>> {
-    job.expect_output(&[Kind::Molecule])?;
+    job.expect_output(&output::KINDS)?;
     let molecule = job.read_molecule()?;
     let mut solved: Vec<Solved> = Vec::new();
     let mut first: Option<Model> = None;
@@ -339,9 +349,15 @@ fn tunnels(
         false => None,
     };
     job.warn(result::doubts(verified.as_ref()));
-    if !model.tunnels.is_empty() {
-        job.write_molecule(&shape::spheres(&model.tunnels))?;
-    }
+    let made = output::Found {
+        molecule: &molecule,
+        balls: &model.selected.balls,
+        atoms: &model.selected.atoms,
+        tunnels: &model.tunnels,
+        probe_radius: params.probe_radius,
+        memory: params.memory,
+    };
+    output::write(job, &made)?;
     let accuracy = accuracy(&model, verified.as_ref());
     let counts: &SelectionCounts = &model.selected.counts;
     let searched = model.searched;

@@ -20,7 +20,9 @@ pub struct Wrapped {
 }
 
 /// Options that the wrapping command sets itself, or that would have every run write over one file.
-const TAKEN: &[&str] = &["output", "preview", "clusters", "timings", "verify"];
+const TAKEN: &[&str] = &[
+    "output", "preview", "profile", "script", "plot", "clusters", "timings", "verify",
+];
 
 impl Wrapped {
     /// Takes the words of a command apart. Errs with what to say to the user.

@@ -68,6 +68,7 @@ const MOLECULES: &[Row<Molecule>] = &[
     ("molecules/ring.xyzr", ring_of_spheres),
     ("molecules/ring.csv", ring_of_spheres),
     ("molecules/porthole.xyzr", portholes),
+    ("molecules/nanometres.xyzr", portholes_in_nanometres),
 ];
 
 /// An atom as a molecule has it: its place and name in a residue, an element and a letter.
@@ -203,6 +204,16 @@ const PORTHOLES: [([f64; 3], f64); 3] = [
 
 /// Radii of the atoms around them, in turn.
 const OF_A_HULL: [f64; 5] = [1.7, 1.52, 1.55, 1.7, 1.8];
+
+/// The same in nanometres.
+fn portholes_in_nanometres() -> Molecule {
+    let mut molecule = portholes();
+    for atom in &mut molecule.atoms {
+        atom.position = atom.position.map(|c| (c * 100.0).round() / 1000.0 + 0.0);
+        atom.radius = atom.radius.map(|r| (r * 100.0).round() / 1000.0);
+    }
+    molecule
+}
 
 /// Two layers of atoms around the origin, closed but for round portholes. Three atoms of the rim of each
 /// touch a circle of its radius in both layers; the others stand back.

@@ -20,5 +20,6 @@ mod mutations;
 mod properties;
 mod reports;
 mod trade;
+mod tunnel_outputs;
 mod volumes;
 mod voxelize;

@@ -7,7 +7,7 @@ pub mod shapes;
 pub mod topology;
 pub mod tracer;
 
-use crate::error::Fault;
+use crate::error::{Error, Fault, Result};
 use crate::numeric::vector::Vec3;
 use crate::report::Content;
 use crate::spatial::aabb::Aabb;
@@ -73,6 +73,26 @@ impl Mesh {
             triangles,
             ..Mesh::default()
         }
+    }
+
+    /// Adds the vertices and triangles of another mesh after those that are there, and nothing else of it.
+    ///
+    /// Errs with [`Error::Limit`] where there are 2^32 vertices or more together.
+    pub fn append(&mut self, other: &Mesh) -> Result<()> {
+        let first = self.positions.len();
+        let vertices = first + other.positions.len();
+        if u32::try_from(vertices).is_err() {
+            return Err(Error::Limit {
+                what: "meshes together".into(),
+                needed: format!("{vertices} vertices"),
+                limit: format!("{} vertices", u32::MAX),
+                hint: None,
+            });
+        }
+        self.positions.extend_from_slice(&other.positions);
+        let moved = other.triangles.iter().map(|t| t.map(|v| v + first as u32));
+        self.triangles.extend(moved);
+        Ok(())
     }
 
     /// The triangles with only the vertices that they use, in their order.

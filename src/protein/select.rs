@@ -120,8 +120,8 @@ impl Selected {
     /// Selects the atoms of one model (an index) that count.
     ///
     /// Protein and nucleic acid count, with modified residues and caps ([`classes`]); water and all else
-    /// does where `keep` names it. Of atoms at several places one counts ([the most occupied, then the
-    /// first letter](altlocs::kept)); of those with exactly one centre the largest, and of equal ones the
+    /// does where `keep` names it. Of atoms at several places one counts (the most occupied, then the
+    /// first letter); of those with exactly one centre the largest, and of equal ones the
     /// first. Hydrogens count where there are any. Errs with [`Error::Parameter`] where `keep` names what
     /// is not there, and with [`Error::Geometry`] where no atom counts. Cost: n log n in the atoms of the
     /// model.

@@ -3,7 +3,7 @@
 use super::shade::{Subject, render};
 use crate::camera::{Camera, Size, THREE_QUARTER};
 use crate::error::Result;
-use crate::image::colour::{self, FAINT_INK, INK, Srgb, WHITE};
+use crate::image::colour::{self, FAINT_INK, INK, Linear, Srgb, WHITE};
 use crate::image::png::{README_LIMIT, encode_within};
 use crate::image::raster::Picture;
 use crate::image::text::{self, Align};
@@ -55,21 +55,44 @@ impl Up {
     }
 }
 
+/// Where a model is looked at from.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct View {
+    /// From the model to the viewer.
+    pub viewer: Vec3,
+    /// What is up.
+    pub up: Vec3,
+}
+
 /// How a preview is laid out.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Params {
     /// Columns of the picture; rows follow from the shape of the model.
     pub width: usize,
+    /// Rows for the model at most.
+    pub rows: usize,
     /// What is up.
     pub up: Up,
+    /// Where it is looked at from, instead of the three-quarter view with that up.
+    pub view: Option<View>,
 }
 
 impl Params {
     /// The look of all previews.
     pub const DEFAULT: Params = Params {
         width: 1024,
+        rows: 480,
         up: Up::Y,
+        view: None,
     };
+
+    /// Where models are looked at from.
+    fn view(&self) -> View {
+        self.view.unwrap_or(View {
+            viewer: self.up.viewer(),
+            up: self.up.direction(),
+        })
+    }
 }
 
 /// Something to draw.
@@ -77,6 +100,8 @@ impl Params {
 pub enum What<'a> {
     /// The triangles of a mesh.
     Mesh(&'a Mesh),
+    /// The triangles of several meshes, each in a colour of its own.
+    Parts(&'a [(&'a Mesh, Srgb)]),
     /// The set voxels of a volume, as cubes.
     Voxels(&'a Volume),
 }
@@ -88,7 +113,8 @@ pub struct Panel<'a> {
     pub label: &'a str,
     /// What is drawn.
     pub what: What<'a>,
-    /// In which colour: [`colour::CLAY`], or one of the palette for the thing of interest.
+    /// In which colour, unless parts have their own: [`colour::CLAY`], or one of the palette for the thing
+    /// of interest.
     pub colour: Srgb,
 }
 
@@ -100,7 +126,7 @@ pub struct Panel<'a> {
 /// are drawn reduced, and the caption says so. The file is below 200 kB in all but pathological
 /// cases. Equal input gives equal bytes, on any number of threads.
 ///
-/// Errors as [`boundary_faces`]. Cost: linear in the triangles, the set voxels and the pixels.
+/// Errors as [`boundary_faces`], and where parts together have 2^32 vertices. Cost: linear in the triangles, the set voxels and the pixels.
 pub fn side_by_side(
     panels: &[Panel],
     caption: &str,
@@ -110,7 +136,7 @@ pub fn side_by_side(
     let width = params.width.clamp(64, 8192);
     let drawn: Vec<Drawn> = panels.iter().map(Drawn::new).collect::<Result<_>>()?;
     let column = (width / panels.len().max(1)).max(1);
-    let (camera, rows) = common_view(&drawn, column, params.up);
+    let (camera, rows) = common_view(&drawn, column, params);
     let size = Size {
         width: column,
         height: rows,
@@ -120,10 +146,10 @@ pub fn side_by_side(
         let subject = Subject {
             positions: &drawn.mesh.positions,
             triangles: &drawn.mesh.triangles,
-            colour: colour::to_linear(panel.colour),
+            colours: &drawn.colours,
             squares: drawn.squares,
         };
-        let raster = render(&subject, &camera, size, params.up.direction());
+        let raster = render(&subject, &camera, size, params.view().up);
         picture.paste(&raster, i * column, 0);
         let at = [(i as f64 + 0.5) * column as f64, (rows + 14) as f64];
         let label = text::shortened(panel.label, LABEL_CAP, column as f64 - SIDE);
@@ -151,18 +177,36 @@ pub fn side_by_side(
 /// A panel's content as triangles.
 struct Drawn<'a> {
     mesh: Cow<'a, Mesh>,
+    /// Colours, each with the first triangle that has it.
+    colours: Vec<(usize, Linear)>,
     squares: bool,
     factor: usize,
 }
 
 impl<'a> Drawn<'a> {
     fn new(panel: &Panel<'a>) -> Result<Self> {
+        let whole = vec![(0, colour::to_linear(panel.colour))];
         Ok(match panel.what {
             What::Mesh(mesh) => Drawn {
                 mesh: Cow::Borrowed(mesh),
+                colours: whole,
                 squares: false,
                 factor: 1,
             },
+            What::Parts(parts) => {
+                let mut joined = Mesh::default();
+                let mut colours = Vec::with_capacity(parts.len());
+                for (mesh, colour) in parts {
+                    colours.push((joined.triangles.len(), colour::to_linear(*colour)));
+                    joined.append(mesh)?;
+                }
+                Drawn {
+                    mesh: Cow::Owned(joined),
+                    colours,
+                    squares: false,
+                    factor: 1,
+                }
+            }
             What::Voxels(volume) => {
                 let (small, factor) = if volume.frame.dims.iter().any(|d| *d > MAX_VOXELS) {
                     let (small, factor) = reduced(volume, MAX_VOXELS);
@@ -172,6 +216,7 @@ impl<'a> Drawn<'a> {
                 };
                 Drawn {
                     mesh: Cow::Owned(boundary_faces(&small)?),
+                    colours: whole,
                     squares: true,
                     factor,
                 }
@@ -181,12 +226,13 @@ impl<'a> Drawn<'a> {
 }
 
 /// One camera for all panels, and the rows that the model needs in a column of this width.
-fn common_view(drawn: &[Drawn], column: usize, up: Up) -> (Camera, usize) {
+fn common_view(drawn: &[Drawn], column: usize, params: &Params) -> (Camera, usize) {
     let bounds = drawn
         .iter()
         .map(|d| d.mesh.used_bounds())
         .fold(Aabb::EMPTY, Aabb::union);
-    let camera = Camera::framing(&bounds, up.viewer(), up.direction(), 1.0);
+    let View { viewer, up } = params.view();
+    let camera = Camera::framing(&bounds, viewer, up, 1.0);
     let seen = drawn
         .iter()
         .map(|d| camera.seen(&shown_vertices(&d.mesh)))
@@ -196,7 +242,7 @@ fn common_view(drawn: &[Drawn], column: usize, up: Up) -> (Camera, usize) {
     let rows = (column as f64 * shape.clamp(0.45, 1.0)).round() as usize;
     let size = Size {
         width: column,
-        height: rows.clamp(32, 480),
+        height: rows.clamp(32, params.rows.clamp(32, 8192)),
     };
     (camera.fitted(seen, size.aspect()), size.height)
 }
@@ -375,10 +421,44 @@ mod tests {
     }
 
     #[test]
+    fn parts_have_their_own_colours_and_the_view_is_the_one_asked_for() {
+        let [left, right] = [-1.2, 1.2].map(|x| shapes::octasphere([x, 0.0, 0.0], 1.0, 20));
+        let parts = [(&left, colour::CLAY), (&right, colour::OKABE_ITO[5])];
+        let panel = Panel {
+            label: "two",
+            what: What::Parts(&parts),
+            colour: colour::CLAY,
+        };
+        let seen = |viewer: Vec3, up: Vec3| {
+            let params = Params {
+                width: 300,
+                rows: 90,
+                view: Some(View { viewer, up }),
+                ..Params::DEFAULT
+            };
+            let bytes = side_by_side(&[panel], "", "", &params).expect("a picture");
+            let (width, height, pixels) = decode(&bytes);
+            assert_eq!((width, height), (300, 90 + LABEL_ROWS + FOOT_ROWS));
+            let blue = |x: usize, y: usize| {
+                let [r, _, b] = pixels[y * width + x].map(i32::from);
+                b - r > 40
+            };
+            [[150 - 40, 45], [150 + 40, 45], [150, 20], [150, 70]].map(|[x, y]| blue(x, y))
+        };
+        let front = seen([0.0, 0.0, 1.0], [0.0, 1.0, 0.0]);
+        assert_eq!(front[..2], [false, true]);
+        let behind = seen([0.0, 0.0, -1.0], [0.0, 1.0, 0.0]);
+        assert_eq!(behind[..2], [true, false]);
+        let turned = seen([0.0, 0.0, 1.0], [1.0, 0.0, 0.0]);
+        assert_eq!(turned[2..], [true, false]);
+    }
+
+    #[test]
     fn nothing_and_hostile_things_are_drawn_without_a_fault() {
         let params = Params {
             width: 200,
             up: Up::Z,
+            ..Params::DEFAULT
         };
         let flat = shapes::sheet(1.0, 1.0, 2, 2);
         let speck = Mesh::from_triangles(vec![[1e9; 3]; 3], vec![[0, 1, 2]]);

@@ -27,18 +27,30 @@ const CAST: f32 = 0.16;
 /// Edges of squares are drawn in full from this many pixels on, and not at all below half as many.
 const READABLE: f32 = 8.0;
 
-/// What is drawn: triangles of one colour.
+/// What is drawn: triangles in one colour or a few.
 #[derive(Debug, Clone, Copy)]
 pub struct Subject<'a> {
     /// Places in the world.
     pub positions: &'a [Vec3],
     /// Triangles; both sides are alike.
     pub triangles: &'a [[u32; 3]],
-    /// Colour of the material.
-    pub colour: Linear,
+    /// Colours of the material, each with the first triangle that has it; the first of them with 0.
+    pub colours: &'a [(usize, Linear)],
     /// Whether triangles 2 f and 2 f + 1 are `[a, b, c]` and `[a, c, d]` of a parallelogram, as
     /// [`crate::volume::surface::boundary_faces`] makes them, whose edges are to be drawn.
     pub squares: bool,
+}
+
+impl Subject<'_> {
+    /// The colour of a triangle.
+    #[inline]
+    fn colour_of(&self, triangle: usize) -> Linear {
+        let after = self
+            .colours
+            .partition_point(|(first, _)| *first <= triangle);
+        let run = after.checked_sub(1).and_then(|run| self.colours.get(run));
+        run.map_or([1.0; 3], |(_, colour)| *colour)
+    }
 }
 
 /// Draws a subject on a white ground.
@@ -84,7 +96,8 @@ pub fn render(subject: &Subject, camera: &Camera, size: Size, up: Vec3) -> Raste
         .map(|at| {
             if samples.is_hit(at) {
                 let ink = edge_ink(subject, camera, &samples, at);
-                material(subject.colour, samples.normal[at], light[at], &key, &ground)
+                let colour = subject.colour_of(samples.triangle[at] as usize);
+                material(colour, samples.normal[at], light[at], &key, &ground)
                     .map(|c| c * (1.0 - 0.42 * ink))
             } else {
                 let [hidden, lit] = light[at];
@@ -219,7 +232,7 @@ mod tests {
         let subject = Subject {
             positions: &mesh.positions,
             triangles: &mesh.triangles,
-            colour: [0.5; 3],
+            colours: &[(0, [0.5; 3])],
             squares: false,
         };
         render(&subject, &camera, SIZE, UP)

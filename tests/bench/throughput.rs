@@ -16,6 +16,7 @@ use serde_json::json;
 use std::io::Write;
 use std::time::Instant;
 
+mod molecules;
 mod scenes;
 mod shadows;
 
@@ -266,4 +267,5 @@ fn main() {
     volumes(&plan);
     voxelizations(&plan);
     shadows::run(&plan);
+    molecules::run(&plan);
 }

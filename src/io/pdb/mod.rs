@@ -2,8 +2,8 @@
 //!
 //! Read are `ATOM`, `HETATM`, `MODEL`, `ENDMDL`, `TER`, `END`, the entry's name of `HEADER`, and which
 //! residues `MODRES` places in a chain; no bonds, no symmetry, no temperature tensors. Lines may end
-//! after the coordinates. Numbers that need more columns than there are may be hybrid-36
-//! ([`super::hybrid36`]), or go over into the blank column beside theirs. Source: wwPDB, Protein Data
+//! after the coordinates. Numbers that need more columns than there are may be hybrid-36,
+//! or go over into the blank column beside theirs. Source: wwPDB, Protein Data
 //! Bank Contents Guide 3.3, 2012.
 
 #[cfg(test)]

@@ -211,12 +211,17 @@ fn atoms_move_with_their_radii_and_are_reordered_and_doubled() {
         assert_eq!(refused, Err("atoms have no faces".to_owned()), "{change:?}");
     }
     // A radius that becomes too small for all its digits is rounded, as a coordinate is.
-    let tiny = [Ball {
+    let tiny = Ball {
         centre: [0.0; 3],
-        radius: 1.7,
-    }; 2];
-    let lost = Step::Scale(-1070).apply(&Subject::Atoms(tiny.to_vec()), 0);
-    assert!(lost.expect("atoms").rounded.is_some());
+        radius: 1.7 * 2f64.powi(-60),
+    };
+    let lost = Step::Scale(-1000).apply(&Subject::Atoms(vec![tiny]), 0);
+    let rounded = atoms_of(
+        lost.expect("an atom")
+            .rounded
+            .expect("a radius that is rounded"),
+    );
+    assert!(rounded[0].radius != tiny.radius);
 }
 
 #[test]

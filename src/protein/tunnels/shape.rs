@@ -22,6 +22,11 @@ const DENSITY: f64 = 4.0;
 /// Balls of a tube at most, for whatever steps: closer ones change nothing that can be seen.
 const SMALLEST_GAP: f64 = 0.02;
 
+/// Each tunnel's grid is moved by one more of these shares of the spacing: where tunnels share a course, no
+/// vertex of one is at the place of another's, which those who join vertices by their places would take
+/// for one.
+const GOLDEN: f64 = 0.618_033_988_749_894_8;
+
 /// The stops of tunnels as atoms: a residue for each tunnel, in order, numbered from 1.
 ///
 /// Atoms are hydrogens with names of their own, as readers drop the second of a name; each has the
@@ -107,7 +112,7 @@ pub(super) fn tube(tunnel: &Tunnel, clearance: &Clearance) -> Vec<Ball> {
 }
 
 /// Over how much of a surface balls along a line spread at most: their own, and the sides between them.
-fn area(balls: &[Ball]) -> f64 {
+pub(super) fn area(balls: &[Ball]) -> f64 {
     use std::f64::consts::PI;
     let ends = [balls.first(), balls.last()].into_iter().flatten();
     let caps: f64 = ends.map(|ball| 2.0 * PI * ball.radius * ball.radius).sum();
@@ -142,7 +147,7 @@ pub fn spacing_for(tunnels: &[Tunnel]) -> f64 {
 ///
 /// Lengths are in the unit of the coordinates. Each tunnel is a closed mesh of its own, and all are joined
 /// in order; [`Mesh::sides`] tells of each triangle the number of the tunnel inside, from 1, with 0
-/// outside. `clearance` is that of the atoms: no vertex lies in one. Vertices lie on the surface of the
+/// outside. Where tunnels share a course their surfaces run through one another. `clearance` is that of the atoms: no vertex lies in one. Vertices lie on the surface of the
 /// balls to a billionth of the spacing; in the midst of triangles, which cut corners, the error is up to
 /// 0.5 `spacing`^2 over the radius of the ball there, and in a crease between balls up to `spacing`. Parts
 /// narrower than the spacing may be lost.
@@ -160,8 +165,9 @@ pub fn surface(
     let tubes: Vec<Vec<Ball>> = tunnels.iter().map(|t| tube(t, clearance)).collect();
     let mut lattices = Vec::with_capacity(tubes.len());
     let (mut kept, mut largest) = (0, 0);
-    for tube in &tubes {
-        let lattice = Lattice::around(&bounds(tube), spacing)?;
+    for (rank, tube) in tubes.iter().enumerate() {
+        let share = (rank as f64 * GOLDEN).fract();
+        let lattice = Lattice::around(&bounds(tube), spacing)?.moved(share);
         let [grid, all] = [lattice.bytes(0.0), lattice.bytes(area(tube))];
         kept += all - grid;
         largest = largest.max(grid);
@@ -177,18 +183,7 @@ pub fn surface(
     let mut sides = Vec::new();
     for ((number, tube), lattice) in (1..).zip(&tubes).zip(&lattices) {
         let mesh = union(tube, lattice, progress)?;
-        let first = joined.positions.len();
-        if first + mesh.positions.len() > u32::MAX as usize {
-            return Err(Error::Limit {
-                what: "the surface of the tunnels".into(),
-                needed: format!("over {first} vertices"),
-                limit: format!("{} vertices", u32::MAX),
-                hint: Some("a larger spacing takes fewer".into()),
-            });
-        }
-        joined.positions.extend(mesh.positions);
-        let moved = mesh.triangles.iter().map(|t| t.map(|v| v + first as u32));
-        joined.triangles.extend(moved);
+        joined.append(&mesh)?;
         sides.resize(joined.triangles.len(), [number, 0]);
     }
     joined.sides = Some(sides);
@@ -196,7 +191,7 @@ pub fn surface(
 }
 
 /// The surface of balls together.
-fn union(balls: &[Ball], lattice: &Lattice, progress: &dyn Progress) -> Result<Mesh> {
+pub(super) fn union(balls: &[Ball], lattice: &Lattice, progress: &dyn Progress) -> Result<Mesh> {
     let near = Clearance::new(balls);
     // The first ball found to hold a point tells that it is inside.
     let inside = lattice.select(|p| near.between(p, 0.0, f64::INFINITY) <= 0.0);
@@ -380,6 +375,8 @@ mod tests {
         let deepest = mesh.positions.iter().map(|p| clearance.at(*p));
         let deepest = deepest.fold(f64::INFINITY, f64::min);
         assert!(deepest >= -1e-9 * spacing, "{deepest}");
+        // As one, too, though the tunnels begin alike.
+        assert!(volume(&mesh) > 0.0);
         let sides = mesh.sides.as_ref().expect("sides");
         assert_eq!(sides.len(), mesh.triangles.len());
         for number in 1..=3 {

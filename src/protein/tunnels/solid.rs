@@ -32,7 +32,8 @@ pub(super) struct Lattice {
 }
 
 impl Lattice {
-    /// Points around a box, with at least one outside of it on every side.
+    /// Points around a box, with at least one outside of it on every side, of which one would be at the
+    /// origin of the coordinates.
     ///
     /// Errs where the spacing is no length above 0, or so small that it makes over 2^29 points along a
     /// side.
@@ -41,19 +42,31 @@ impl Lattice {
             let problem = "must be above 0, and finite";
             return Err(Error::parameter("spacing", spacing, problem));
         }
-        let steps = bounds.extent().map(|wide| (wide / spacing).ceil() + 3.0);
-        if let Some(points) = steps.iter().find(|points| !(**points <= MOST_POINTS)) {
+        if bounds.is_empty() {
+            return Ok(Lattice {
+                origin: [0.0; 3],
+                spacing,
+                dims: [1; 3],
+            });
+        }
+        let first = bounds.lo.map(|c| (c / spacing).floor() - 1.0);
+        let points: Vec3 =
+            std::array::from_fn(|a| (bounds.hi[a] / spacing).ceil() + 2.0 - first[a]);
+        if let Some(points) = points.iter().find(|points| !(**points <= MOST_POINTS)) {
             let problem = format!("makes {points} points along a side, over {MOST_POINTS}");
             return Err(Error::parameter("spacing", spacing, problem));
         }
-        let dims = steps.map(|points| points as usize);
-        let centre = bounds.centre();
-        let origin = |a: usize| centre[a] - 0.5 * spacing * (dims[a] - 1) as f64;
         Ok(Lattice {
-            origin: std::array::from_fn(origin),
+            origin: first.map(|steps| spacing * steps),
             spacing,
-            dims,
+            dims: points.map(|points| points as usize),
         })
+    }
+
+    /// The lattice moved down along all axes, by a share of the spacing from 0 to below 1.
+    pub fn moved(mut self, share: f64) -> Self {
+        self.origin = self.origin.map(|c| c - share * self.spacing);
+        self
     }
 
     /// Bytes that the surface of a solid of this area takes while it is made.
@@ -67,15 +80,19 @@ impl Lattice {
         std::array::from_fn(|a| self.origin[a] + self.spacing * at[a] as f64)
     }
 
-    /// All points for which a test holds.
+    /// All points for which a test holds, but for those of the outermost layers, which are taken to be
+    /// outside.
     pub fn select(&self, holds: impl Fn(Vec3) -> bool + Sync) -> BitGrid {
-        let [nx, ny, _] = self.dims;
+        let [nx, ny, nz] = self.dims;
         let mut bits = BitGrid::new(self.dims);
         let slice = bits.stride() * ny;
         let fill = |(z, out): (usize, &mut [u64])| {
             let mut one = BitGrid::new([nx, ny, 1]);
-            for y in 0..ny {
-                for x in 0..nx {
+            if z == 0 || z + 1 == nz {
+                return;
+            }
+            for y in 1..ny.saturating_sub(1) {
+                for x in 1..nx.saturating_sub(1) {
                     if holds(self.point([x, y, z])) {
                         one.set(x, y, 0);
                     }
@@ -195,5 +212,10 @@ mod tests {
         let lattice = Lattice::around(&bounds, 0.5).expect("a lattice");
         assert_eq!(lattice.dims, [5; 3]);
         assert_eq!(lattice.point([0, 2, 4]), [-0.5, 0.5, 1.5]);
+        // The origin is a point to the last bit, however the spacing is.
+        let lattice = Lattice::around(&bounds, 0.1).expect("a lattice");
+        assert_eq!(lattice.point([1; 3]), [0.0; 3]);
+        let all = lattice.select(|_| true);
+        assert_eq!(all.count(), 11 * 11 * 11);
     }
 }

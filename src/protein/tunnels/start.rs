@@ -1,9 +1,9 @@
 //! Where ways start.
 
-use super::Halt;
 use super::graph::Graph;
 use super::params::Params;
 use super::search::{Outside, Place};
+use super::solve::Halt;
 use crate::error::{Error, Fault};
 use crate::numeric::vector::{length, sub};
 

@@ -1,7 +1,10 @@
+use super::graph::{Graph, Metric};
+use super::search::Outside;
 use super::*;
 use crate::numeric::rng::Rng;
-use crate::numeric::vector::{add, cross, dot, normalize, scale};
+use crate::numeric::vector::{add, cross, dot, length, normalize, scale, sub};
 use crate::progress::Silent;
+use crate::spatial::delaunay3::Delaunay3;
 
 fn ball(centre: [f64; 3], radius: f64) -> Ball {
     Ball { centre, radius }
