@@ -43,6 +43,7 @@ pub fn picture(
         tunnels: TUNNEL_SPACING,
     };
     let cut = cut_open(balls, tunnels, fineness, memory, progress)?;
+    progress.stage("draw", 0);
     let tubes = cut.tunnels.iter().enumerate();
     let tubes = tubes.map(|(k, tube)| (tube, colour_of(k)));
     let parts: Vec<(&Mesh, Srgb)> = [(&cut.mesh, CLAY)].into_iter().chain(tubes).collect();

@@ -19,12 +19,12 @@ pub fn sample() -> (Molecule, Vec<u32>, Vec<Tunnel>) {
         if length(sub(centre, [10.5; 3])) < 4.0 {
             continue;
         }
-        let counts = k % 2 == 1;
+        let counts = !k.is_multiple_of(2);
         let place = Place {
             name: name(if counts { "LIG" } else { "HOH" }),
             chain: name(if index < 108 { "A" } else { "B" }),
             number: index as i32 / 2 - 10,
-            insertion: if index % 2 == 0 { b' ' } else { b'B' },
+            insertion: if index.is_multiple_of(2) { b' ' } else { b'B' },
             in_polymer: false,
         };
         let atom = Atom {

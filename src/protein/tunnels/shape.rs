@@ -147,10 +147,11 @@ pub fn spacing_for(tunnels: &[Tunnel]) -> f64 {
 ///
 /// Lengths are in the unit of the coordinates. Each tunnel is a closed mesh of its own, and all are joined
 /// in order; [`Mesh::sides`] tells of each triangle the number of the tunnel inside, from 1, with 0
-/// outside. Where tunnels share a course their surfaces run through one another. `clearance` is that of the atoms: no vertex lies in one. Vertices lie on the surface of the
-/// balls to a billionth of the spacing; in the midst of triangles, which cut corners, the error is up to
-/// 0.5 `spacing`^2 over the radius of the ball there, and in a crease between balls up to `spacing`. Parts
-/// narrower than the spacing may be lost.
+/// outside. Where tunnels share a course their surfaces run through one another. `clearance` is that of
+/// the atoms: no vertex lies in one. Vertices lie on the surface of the balls to a billionth of the
+/// spacing; in the midst of triangles, which cut corners, the error is up to 0.5 `spacing`^2 over the
+/// radius of the ball there, and in a crease between balls up to `spacing`. Parts narrower than the
+/// spacing may be lost.
 ///
 /// Errs for a spacing that is not above 0, and with [`Error::Limit`] where the work takes more than
 /// `memory` bytes. Cost: linear in the points of a grid around each tunnel, which take a bit each, and in

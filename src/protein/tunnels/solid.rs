@@ -52,7 +52,8 @@ impl Lattice {
         let first = bounds.lo.map(|c| (c / spacing).floor() - 1.0);
         let points: Vec3 =
             std::array::from_fn(|a| (bounds.hi[a] / spacing).ceil() + 2.0 - first[a]);
-        if let Some(points) = points.iter().find(|points| !(**points <= MOST_POINTS)) {
+        let is_few = |points: &f64| points.is_finite() && *points <= MOST_POINTS;
+        if let Some(points) = points.iter().find(|points| !is_few(points)) {
             let problem = format!("makes {points} points along a side, over {MOST_POINTS}");
             return Err(Error::parameter("spacing", spacing, problem));
         }
