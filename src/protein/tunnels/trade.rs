@@ -1,6 +1,6 @@
 //! The trade that a search for tunnels is: what stands for the atoms.
 
-use crate::trade::{Change, Invariance, Knob, Measure, Part, Placed, Tied, Trade};
+use crate::trade::{Change, GIVEN, Invariance, Knob, Measure, Part, Placed, Tied, Trade};
 
 /// What finding tunnels trades for what.
 pub const TRADE: Trade = Trade {
@@ -45,11 +45,30 @@ pub const TRADE: Trade = Trade {
         tied("radii", SPHERES),
         tied("models", "give a file of that model alone"),
     ],
+    // Moved far away, the places of a tunnel are rounded as they stand there, and its widths with them:
+    // by a few units of their last place, which is not nothing.
     invariant: &[
-        Invariance::always(Change::Shift),
+        // The spacing of a grid is part of a name, and cannot be scaled along.
+        Invariance {
+            under: Change::Scale,
+            only: &[("method", TRIANGULATED), ("shell-radius", GIVEN)],
+        },
         Invariance::always(Change::VertexOrder),
+        Invariance::always(Change::DuplicateFaces),
     ],
 };
+
+/// The methods that search no grid.
+const TRIANGULATED: &[&str] = &[
+    "conservative",
+    "approximate",
+    "balls:4",
+    "balls:6",
+    "balls:8",
+    "balls:12",
+    "balls:20",
+    "exact",
+];
 
 const POINT: &str = "give the place itself as --start X,Y,Z";
 
