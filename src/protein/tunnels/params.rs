@@ -72,7 +72,8 @@ pub enum Removal {
     Narrowest,
     /// All gates from the narrowest furthest from the surface to the surface.
     ToSurface,
-    /// The narrowest gates and those near them, within the larger of their width and 1.
+    /// The narrowest gates and those near them, within the larger of their width and a third of the
+    /// shell's radius.
     Around,
 }
 named! { Removal { Narrowest = "a", ToSurface = "b", Around = "c" } }
@@ -88,7 +89,8 @@ pub struct Params {
     pub start_search: f64,
     /// Tunnels narrower than this are not looked for.
     pub probe_radius: f64,
-    /// Radius of the probe that the bulk solvent is where it comes.
+    /// Radius of the probe that the bulk solvent is where it comes. Ways that are nowhere further apart
+    /// than a third of it are one.
     pub shell_radius: f64,
     /// Ways that end this near one another have one mouth.
     pub mouth: f64,

@@ -332,6 +332,10 @@ pub fn cheapest(
     Ok(None)
 }
 
+/// What stands for the square of a width of 0, so that no cost is infinite. No unit is small enough for a
+/// width to come near its root.
+pub(super) const CLOSED: f64 = 1e-280;
+
 /// What the way through a gate costs, from node to node.
 fn price(graph: &mut Graph, cell: u32, slot: usize, gate: f64, prefer: Prefer) -> f64 {
     let beyond = graph.cell(cell).neighbours[slot];
@@ -340,7 +344,7 @@ fn price(graph: &mut Graph, cell: u32, slot: usize, gate: f64, prefer: Prefer) -
     match prefer {
         Prefer::Length => way,
         Prefer::Cost => {
-            let slowness = |width: f64| 1.0 / (width * width).max(1e-12);
+            let slowness = |width: f64| 1.0 / (width * width).max(CLOSED);
             // Simpson's rule over both ends and the narrowest point.
             way * (slowness(here.width) + 4.0 * slowness(gate) + slowness(there.width)) / 6.0
         }

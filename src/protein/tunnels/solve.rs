@@ -349,7 +349,7 @@ impl<'a> Search<'a> {
                 }
             }
             Removal::Around => {
-                let reach = least.max(1.0);
+                let reach = least.max(self.params.shell_radius * NEAR);
                 for k in (0..gates.len()).filter(minimal) {
                     let centre = self.gate_point(graph, gates[k].0, gates[k].1);
                     self.close_around(graph, gates[k], centre, reach, closed);
@@ -398,7 +398,8 @@ impl<'a> Search<'a> {
 
     /// Whether two tunnels have one mouth, or run the same way.
     fn is_same(&self, a: &Tunnel, b: &Tunnel) -> bool {
-        length(sub(a.exit(), b.exit())) <= self.params.mouth || hausdorff(a, b) < SAME
+        length(sub(a.exit(), b.exit())) <= self.params.mouth
+            || hausdorff(a, b) < self.params.shell_radius * NEAR
     }
 
     /// The atoms as sets of equal balls.
@@ -491,8 +492,9 @@ impl<'a> Search<'a> {
     }
 }
 
-/// Ways nearer than this to one another all along are one.
-const SAME: f64 = 1.0;
+/// Over the radius of the solvent's probe, which sets the unit: ways nearer than this to one another all
+/// along are one.
+const NEAR: f64 = 1.0 / 3.0;
 
 /// The largest distance of a stop of either tunnel to the nearest of the other.
 pub fn hausdorff(a: &Tunnel, b: &Tunnel) -> f64 {

@@ -1,6 +1,6 @@
 //! The trade that a search for tunnels is: what stands for the atoms.
 
-use crate::trade::{Change, Invariance, Knob, Measure, Part, Placed, Tied, Trade};
+use crate::trade::{Change, GIVEN, Invariance, Knob, Measure, Part, Placed, Tied, Trade};
 
 /// What finding tunnels trades for what.
 pub const TRADE: Trade = Trade {
@@ -26,16 +26,18 @@ pub const TRADE: Trade = Trade {
     reference: "the exact width, which an octree confirms",
     result: "xyzr",
     placed: &[
+        Placed::new("start", &[Part::Point]),
+        Placed::new("start-search", &[Part::Length]),
         Placed {
-            option: "start",
-            parts: &[Part::Point],
+            option: "method",
+            prefix: "grid:",
+            parts: &[Part::Length],
         },
-        length("start-search"),
-        length("shell-radius"),
-        length("probe-radius"),
-        length("mouth"),
-        length("tolerance"),
-        length("step"),
+        Placed::new("shell-radius", &[Part::Length]),
+        Placed::new("probe-radius", &[Part::Length]),
+        Placed::new("mouth", &[Part::Length]),
+        Placed::new("tolerance", &[Part::Length]),
+        Placed::new("step", &[Part::Length]),
     ],
     tied: &[
         tied("start-residues", POINT),
@@ -45,20 +47,22 @@ pub const TRADE: Trade = Trade {
         tied("radii", SPHERES),
         tied("models", "give a file of that model alone"),
     ],
+    // Moved far away, the places of a tunnel are rounded as they stand there, and its widths with them:
+    // by a few units of their last place, which is not nothing.
     invariant: &[
-        Invariance::always(Change::Shift),
+        // Without it, it is 3 or 4 whatever the unit.
+        Invariance {
+            under: Change::Scale,
+            only: &[("shell-radius", GIVEN)],
+        },
         Invariance::always(Change::VertexOrder),
+        Invariance::always(Change::DuplicateFaces),
     ],
 };
 
 const POINT: &str = "give the place itself as --start X,Y,Z";
 
 const SPHERES: &str = "give a file of the spheres themselves (xyzr)";
-
-const fn length(option: &'static str) -> Placed {
-    let parts = &[Part::Length];
-    Placed { option, parts }
-}
 
 const fn tied(option: &'static str, instead: &'static str) -> Tied {
     Tied { option, instead }

@@ -1,7 +1,7 @@
 //! A way through the graph as a tunnel: its centreline, and how wide that is, certified.
 
 use super::graph::{Graph, Metric};
-use super::search::{Outside, Route};
+use super::search::{CLOSED, Outside, Route};
 use crate::numeric::vector::{add, length, scale, sub};
 use crate::protein::clearance::{Ball, Clearance, Near};
 use schemars::JsonSchema;
@@ -232,7 +232,7 @@ fn stops(
 
 /// The integral of `1 / r^2` over the stops, by Simpson's rule between neighbours.
 fn cost(stops: &[Stop], clearance: &Clearance) -> f64 {
-    let slowness = |radius: f64| 1.0 / (radius * radius).max(1e-12);
+    let slowness = |radius: f64| 1.0 / (radius * radius).max(CLOSED);
     let piece = |pair: &[Stop]| {
         let middle = scale(add(pair[0].centre, pair[1].centre), 0.5);
         let sum = slowness(pair[0].radius)
