@@ -87,12 +87,12 @@ fn offsets(text: &str) -> Result<Offsets, String> {
 const USAGE: &str = "scantle stability COMMAND INPUT [OPTIONS]";
 
 const AFTER: &str = "\
-Options of the command that are lengths, points, directions or boxes are moved with the input. A
-picture is turned only where its --light and --camera are given, and turn along.
+Options of the command that are lengths, points, directions or boxes are moved with the input; for
+tunnels --shell-radius only where it is given. A picture is turned only where its --light and --camera
+are given, and turn along.
 
 Examples:
   scantle stability voxelize fixtures/shapes/torus-knot.ply --resolution 24 --max-error 0
-  scantle stability voxelize fixtures/shapes/sphere.stl --resolution 16 --offsets 1,1e12
   scantle stability tunnels fixtures/molecules/porthole.xyzr --start 0,0,0 --shell-radius 3
 ";
 
@@ -231,10 +231,18 @@ impl<'a> Bench<'a> {
         undo: bool,
     ) -> Result<Vec<(String, Option<String>)>, String> {
         let mut options = Vec::new();
-        for Placed { option, parts } in self.wrapped.trade.placed {
+        for placed in self.wrapped.trade.placed {
+            let Placed {
+                option,
+                prefix,
+                parts,
+            } = placed;
             for value in self.wrapped.values(option) {
+                let Some(numbers) = value.strip_prefix(prefix) else {
+                    continue;
+                };
                 let wrong = |why: String| format!("--{option} {value}: {why}");
-                let numbers = value.split(',').map(|n| n.trim().parse());
+                let numbers = numbers.split(',').map(|n| n.trim().parse());
                 let numbers: Result<Vec<f64>, _> = numbers.collect();
                 let numbers = numbers.map_err(|_| wrong("something is no number".to_owned()))?;
                 let mut placed = motion.place(parts, &numbers).map_err(wrong)?;
@@ -242,7 +250,10 @@ impl<'a> Bench<'a> {
                     placed = motion.place_back(parts, &placed).map_err(wrong)?;
                 }
                 let words: Vec<String> = placed.iter().map(|n| format!("{n:?}")).collect();
-                options.push(((*option).to_owned(), Some(words.join(","))));
+                options.push((
+                    (*option).to_owned(),
+                    Some(format!("{prefix}{}", words.join(","))),
+                ));
             }
         }
         Ok(options)

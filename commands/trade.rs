@@ -135,10 +135,15 @@ mod tests {
             }
         });
         for (name, trade) in trades {
-            for Placed { option, parts } in trade.placed {
+            for placed in trade.placed {
+                let Placed {
+                    option,
+                    prefix,
+                    parts,
+                } = placed;
                 let takes = |count: usize| {
                     let numbers: Vec<String> = (1..=count).map(|n| n.to_string()).collect();
-                    let option = format!("--{option}={}", numbers.join(","));
+                    let option = format!("--{option}={prefix}{}", numbers.join(","));
                     cli::parse_words(&[name.to_owned(), "a.ply".to_owned(), option]).is_ok()
                 };
                 let count = parts.iter().map(|part| part.numbers()).sum();

@@ -41,8 +41,21 @@ pub struct Knob {
 pub struct Placed {
     /// The long option, without dashes. Where it may be given several times, each value is moved.
     pub option: &'static str,
+    /// What stands before the numbers; a value without it holds none. Empty as a rule.
+    pub prefix: &'static str,
     /// What its comma-separated numbers are, in order.
     pub parts: &'static [Part],
+}
+
+impl Placed {
+    /// An option whose value is nothing but numbers.
+    pub const fn new(option: &'static str, parts: &'static [Part]) -> Self {
+        Placed {
+            option,
+            prefix: "",
+            parts,
+        }
+    }
 }
 
 /// An option whose value names something in the input by what only its own file says of it, such as the

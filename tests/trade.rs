@@ -310,6 +310,18 @@ fn what_cannot_be_varied_is_refused_with_words() {
             "--plot a.pdf: its name must end in .svg or .png",
         ),
         (
+            "stability tunnels a.pdb --start-residues A:106,A:272",
+            "stability: --start-residues depends on what changed copies of the input do not hold; give the place itself as --start X,Y,Z",
+        ),
+        (
+            "stability tunnels a.pdb --start 1,2,3 --keep HEM",
+            "stability: --keep depends on what changed copies of the input do not hold; give a file of the spheres themselves (xyzr)",
+        ),
+        (
+            "stability tunnels a.pdb --pores --clusters a.json",
+            "stability: --clusters is set for tunnels here, and cannot be given",
+        ),
+        (
             "stability voxelize a.ply b.ply",
             "stability: 2 inputs, where one is taken",
         ),
@@ -362,6 +374,60 @@ fn no_voxel_changes_under_what_is_promised() {
             let counts = row["promised"] == true && row["status"] == "done";
             assert!(!counts || row["differing_voxels"] == 0, "{input} {row}");
         }
+    }
+}
+
+#[test]
+fn tunnels_bear_scales_orders_and_doubled_atoms() {
+    const PORTHOLES: &str = "fixtures/molecules/porthole.xyzr --start 0,0,0";
+    for (input, options) in [
+        (PORTHOLES, "--shell-radius 3"),
+        (PORTHOLES, "--shell-radius 3 --method exact --count 1"),
+        (PORTHOLES, "--shell-radius 3 --method grid:0.8 --remove c"),
+        // Atoms of a PDB file without water and ions, sized by element; there are no pores.
+        ("fixtures/molecules/helix.pdb", "--pores --shell-radius 4"),
+    ] {
+        let place = Workplace::new();
+        let ran = place.run(&format!(
+            "stability tunnels {input} {options} --in-process --max-error 0 -q"
+        ));
+        let case = format!("{input} {options}");
+        assert_eq!((ran.code, ran.stderr.as_str()), (0, ""), "{case}");
+        let report = ran.document();
+        assert_eq!(report["result"]["drift"], 0.0, "{case}");
+        let unchanged = &report["result"]["unchanged"];
+        assert_eq!(unchanged["smallest_scale"], -100, "{case}");
+        assert_eq!(unchanged["largest_scale"], 100, "{case}");
+        for row in rows(&report) {
+            let of_faces = ["face-order", "split-vertices", "degenerate-faces"];
+            let is_skipped = of_faces.iter().any(|name| row["change"] == *name);
+            let wanted = if is_skipped { "skipped" } else { "done" };
+            assert_eq!(row["status"], wanted, "{case}: {row}");
+            let known = row["change"] == "vertex-order" || row["change"] == "duplicate-faces";
+            assert!(!known || row["promised"] == true, "{case}: {row}");
+        }
+    }
+}
+
+#[test]
+fn an_input_that_the_command_cannot_take_is_said_to_be_one() {
+    for (line, why) in [
+        (
+            "stability voxelize fixtures/molecules/ring.xyzr",
+            "stability: the untouched input fails: fixtures/molecules/ring.xyzr: holds a molecule (xyzr), but a mesh is needed",
+        ),
+        (
+            "stability voxelize fixtures/volumes/ball.nrrd",
+            "fixtures/volumes/ball.nrrd: holds a volume (nrrd), but a mesh or a molecule is needed",
+        ),
+    ] {
+        let place = Workplace::new();
+        let ran = place.run(line);
+        assert_eq!(
+            (ran.code, ran.stderr),
+            (3, format!("scantle: {why}\n")),
+            "{line}"
+        );
     }
 }
 

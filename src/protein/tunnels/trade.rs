@@ -26,16 +26,18 @@ pub const TRADE: Trade = Trade {
     reference: "the exact width, which an octree confirms",
     result: "xyzr",
     placed: &[
+        Placed::new("start", &[Part::Point]),
+        Placed::new("start-search", &[Part::Length]),
         Placed {
-            option: "start",
-            parts: &[Part::Point],
+            option: "method",
+            prefix: "grid:",
+            parts: &[Part::Length],
         },
-        length("start-search"),
-        length("shell-radius"),
-        length("probe-radius"),
-        length("mouth"),
-        length("tolerance"),
-        length("step"),
+        Placed::new("shell-radius", &[Part::Length]),
+        Placed::new("probe-radius", &[Part::Length]),
+        Placed::new("mouth", &[Part::Length]),
+        Placed::new("tolerance", &[Part::Length]),
+        Placed::new("step", &[Part::Length]),
     ],
     tied: &[
         tied("start-residues", POINT),
@@ -48,36 +50,19 @@ pub const TRADE: Trade = Trade {
     // Moved far away, the places of a tunnel are rounded as they stand there, and its widths with them:
     // by a few units of their last place, which is not nothing.
     invariant: &[
-        // The spacing of a grid is part of a name, and cannot be scaled along.
+        // Without it, it is 3 or 4 whatever the unit.
         Invariance {
             under: Change::Scale,
-            only: &[("method", TRIANGULATED), ("shell-radius", GIVEN)],
+            only: &[("shell-radius", GIVEN)],
         },
         Invariance::always(Change::VertexOrder),
         Invariance::always(Change::DuplicateFaces),
     ],
 };
 
-/// The methods that search no grid.
-const TRIANGULATED: &[&str] = &[
-    "conservative",
-    "approximate",
-    "balls:4",
-    "balls:6",
-    "balls:8",
-    "balls:12",
-    "balls:20",
-    "exact",
-];
-
 const POINT: &str = "give the place itself as --start X,Y,Z";
 
 const SPHERES: &str = "give a file of the spheres themselves (xyzr)";
-
-const fn length(option: &'static str) -> Placed {
-    let parts = &[Part::Length];
-    Placed { option, parts }
-}
 
 const fn tied(option: &'static str, instead: &'static str) -> Tied {
     Tied { option, instead }

@@ -46,14 +46,11 @@ pub const TRADE: Trade = Trade {
     reference: "other rays by watertight triangles",
     result: "png",
     placed: &[
-        Placed {
-            option: "light",
-            parts: &[Part::Point, Part::Length],
-        },
-        Placed {
-            option: "camera",
-            parts: &[Part::Point, Part::Point, Part::Direction, Part::Number],
-        },
+        Placed::new("light", &[Part::Point, Part::Length]),
+        Placed::new(
+            "camera",
+            &[Part::Point, Part::Point, Part::Direction, Part::Number],
+        ),
     ],
     tied: &[],
     invariant: &[

@@ -47,14 +47,8 @@ pub const TRADE: Trade = Trade {
     reference: "exact closest points of the model and its samples",
     result: "svo",
     placed: &[
-        Placed {
-            option: "voxel-size",
-            parts: &[Part::Length],
-        },
-        Placed {
-            option: "bounds",
-            parts: &[Part::Box],
-        },
+        Placed::new("voxel-size", &[Part::Length]),
+        Placed::new("bounds", &[Part::Box]),
     ],
     tied: &[],
     invariant: &[
