@@ -51,7 +51,7 @@ const PARTS: &[Part] = &[
     },
 ];
 
-const ADVICE_ON_TUNNELS: &str = "Choose `exact`: it costs two or three times what `approximate` does, some hundredths of a second for a protein, and leaves nothing to doubt. `approximate` is for many thousands of frames; its two bounds say of each how far it may be off. `balls:12` is nearest to the truth of those that do not know it, at ten times the cost of `exact`. Grids are what others use: [on three enzymes](tunnels.md) they err more than `approximate` at any spacing that costs less than `exact`.";
+const ADVICE_ON_TUNNELS: &str = "Choose `exact`: it costs two or three times what `approximate` does, some hundredths of a second for a protein, and leaves nothing to doubt. `approximate` is for many thousands of frames; its two bounds say of each how far it may be off. `balls:12` is nearest to the truth of those that do not know it, at several times the cost of `exact`. Grids are what others use: [on three enzymes](tunnels.md) they err more than `approximate` at any spacing that costs less than `exact`.";
 
 const ADVICE_ON_SHADOW: &str = "Choose `exact` for meshes of this size: its rays cost no more than those through voxels, and what error is left is the noise of few rays, which `--rays` buys down. Choose `octree` where many small triangles stand apart, as the twigs of [a tree](shadow.md) do: there its shadow rays take about four fifths of the time of exact ones. Against walking the grid it answers the same rays, to the bit, in less than a quarter of the time at 512 voxels and 16 rays, from 1.6 % of the nodes. With conservative voxels neither lets light through; the error is false shadow of about a voxel around the true one.";
 
