@@ -6,7 +6,7 @@ use crate::numeric::vector::{add, length, scale, sub};
 /// Points that a centreline is compared by.
 const POINTS: usize = 16;
 
-/// A centreline as [`POINTS`] points an equal way apart.
+/// A centreline as sixteen points an equal way apart.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Course([[f64; 3]; POINTS]);
 

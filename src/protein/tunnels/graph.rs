@@ -123,10 +123,10 @@ impl<'a> Graph<'a> {
 
     /// Bytes that it takes.
     pub fn bytes(&self) -> u64 {
-        let cells = self.triangulation.cells().len();
+        let cells = size_of_val(self.triangulation.cells());
         let points = self.triangulation.points().len();
         let of_point = size_of::<[f64; 4]>() + 2 * size_of::<u32>();
-        let triangulation = (cells * size_of::<Cell>() + points * of_point) as u64;
+        let triangulation = (cells + points * of_point) as u64;
         triangulation + self.nodes.bytes() + self.gates.bytes()
     }
 

@@ -43,8 +43,11 @@ fn turned(p: [f64; 3], axes: &[[f64; 3]; 3], by: [f64; 3]) -> [f64; 3] {
     (0..3).fold(by, |sum, k| add(sum, scale(axes[k], p[k])))
 }
 
+/// A lattice's name, points in a cell of side 1, place to start and gate.
+type Lattice = (&'static str, Vec<[f64; 3]>, [f64; 3], f64);
+
 /// Lattices: their points in a cell of side 1, a place to start, the gate and the clearance there.
-fn lattices() -> Vec<(&'static str, Vec<[f64; 3]>, [f64; 3], f64)> {
+fn lattices() -> Vec<Lattice> {
     let half = 0.5;
     vec![
         ("simple", vec![[0.0; 3]], [half; 3], 0.5f64.sqrt()),

@@ -120,9 +120,8 @@ pub fn centreline(graph: &mut Graph, route: &Route, outside: &Outside) -> Vec<[f
             points.push(centre);
         }
         if let Some(slot) = route.slots.get(index) {
-            if let Some(crossing) = graph.narrowest(*cell, *slot) {
-                points.push(crossing.point);
-            }
+            let crossing = graph.narrowest(*cell, *slot);
+            points.extend(crossing.map(|crossing| crossing.point));
         }
     }
     points.dedup();
