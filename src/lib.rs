@@ -13,10 +13,11 @@
 //! | 2 | [`spatial`] [`image`] |
 //! | 3 | [`mesh`] [`camera`] |
 //! | 4 | [`volume`] |
-//! | 5 | [`render`] [`protein`] |
+//! | 5 | [`render`] [`protein`] [`anim`] |
 //! | 6 | [`measure`] [`io`] (used by commands alone) |
 #![deny(clippy::print_stdout, clippy::print_stderr)]
 
+pub mod anim;
 pub mod camera;
 pub mod error;
 pub mod image;

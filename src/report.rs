@@ -109,6 +109,12 @@ pub struct Content {
     /// Models of a molecule, where there are several.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub models: Option<u64>,
+    /// Frames of an animation.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub frames: Option<u64>,
+    /// Frames per second of an animation.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub rate: Option<f64>,
     /// Documents of a JSON file.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub documents: Option<u64>,

@@ -38,9 +38,15 @@ const MAY_USE: &[(&str, &[&str])] = &[
         ],
     ),
     (
+        "anim",
+        &[
+            "error", "mesh", "numeric", "progress", "report", "spatial", "trade",
+        ],
+    ),
+    (
         "measure",
         &[
-            "error", "image", "mesh", "numeric", "progress", "protein", "report", "spatial",
+            "anim", "error", "image", "mesh", "numeric", "progress", "protein", "report", "spatial",
             "trade", "volume",
         ],
     ),
@@ -48,7 +54,7 @@ const MAY_USE: &[(&str, &[&str])] = &[
     (
         "io",
         &[
-            "error", "image", "mesh", "numeric", "protein", "report", "volume",
+            "anim", "error", "image", "mesh", "numeric", "protein", "report", "spatial", "volume",
         ],
     ),
 ];

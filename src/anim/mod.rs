@@ -1,0 +1,5 @@
+//! Animations: one mesh whose vertices move.
+
+pub mod clip;
+
+pub use clip::Clip;
