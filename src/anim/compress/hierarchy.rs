@@ -84,8 +84,6 @@ struct Taken {
     inner: usize,
 }
 
-/// Vertices of a ring, at most.
-const WIDEST: usize = 24;
 
 impl Thinning {
     /// Takes out the vertices of one round: those of few neighbours first, none beside another.
@@ -116,7 +114,7 @@ impl Thinning {
             self.around[*u as usize].retain(|w| *w != v);
         }
         let beyond = |u: &u32| self.around[*u as usize].iter().copied();
-        let outer: Vec<u32> = ring.iter().take(WIDEST).flat_map(beyond).collect();
+        let outer: Vec<u32> = ring.iter().take(Hierarchy::WIDEST).flat_map(beyond).collect();
         let centre = ring.iter().copied().min_by_key(|u| {
             let around = &self.around[*u as usize];
             let new = ring.iter().filter(|w| *w != u && !around.contains(w));
@@ -130,10 +128,10 @@ impl Thinning {
                 }
             }
         }
-        ring.truncate(WIDEST);
+        ring.truncate(Hierarchy::WIDEST);
         let inner = ring.len();
         for u in outer {
-            if ring.len() < WIDEST && !ring.contains(&u) {
+            if ring.len() < Hierarchy::WIDEST && !ring.contains(&u) {
                 ring.push(u);
             }
         }
@@ -235,6 +233,9 @@ impl Hierarchy {
             _ => 4,
         }
     }
+
+    /// Vertices of a ring, at most.
+    pub const WIDEST: usize = 24;
 
     /// Classes of [`Hierarchy::level`].
     pub const LEVELS: usize = 5;

@@ -1,7 +1,7 @@
 //! What a value at a vertex is expected to be, from the values at coarser vertices around it.
 //!
 //! Positions already known tell how the vertices lie to one another. The weights are those of
-//! kriging: they make the expected squared error least for values that differ by a power of the
+//! kriging: they make the expected squared error least for values that are smooth over a short
 //! distance, and reproduce almost exactly whatever is an affine function of the known positions, as
 //! the motion of a rigid part is. Source: G. Matheron, "The intrinsic random functions and their
 //! applications" (1973).
@@ -9,8 +9,13 @@
 use super::hierarchy::Hierarchy;
 use rayon::prelude::*;
 
-/// How much less trusted than the distance law a single value is: its own share of noise.
-const NOISE: f64 = 0.003;
+/// What a single value has of its own, that no other tells.
+const NOISE: f64 = 0.005;
+/// How far smooth functions stay alike, squared, in units of a ring's spread.
+const REACH: f64 = 12.0;
+/// Coordinates of a place, and vertices of a ring, at most.
+const MOST_DIMS: usize = 64;
+const MOST_RING: usize = Hierarchy::WIDEST;
 /// How far the vertices beyond the ring take the mean of those beside a vertex outwards, where no
 /// position is known.
 const OUTWARDS: f64 = 0.25;
@@ -47,9 +52,13 @@ impl Weights {
             parts.push((rank, part));
             rest = after;
         }
-        parts.into_par_iter().with_min_len(64).for_each_init(Vec::new, |system, (rank, part)| {
-            let known = Places { places, dims, affine };
-            known.krige(hierarchy.rings.of(rank), rank, system, part);
+        let known = Places {
+            places,
+            dims,
+            affine,
+        };
+        parts.into_par_iter().with_min_len(64).for_each_init(Room::default, |room, (rank, part)| {
+            known.krige(hierarchy.rings.of(rank), rank, room, part);
         });
         Weights(all)
     }
@@ -65,105 +74,138 @@ impl Weights {
 }
 
 /// Where vertices are.
+#[derive(Clone, Copy)]
 struct Places<'a> {
     places: &'a [f64],
     dims: usize,
     affine: f64,
 }
 
-impl Places<'_> {
-/// The weights of one ring.
-fn krige(&self, ring: &[u32], rank: usize, system: &mut Vec<f64>, weights: &mut [f64]) {
-    let Places { places, dims, affine } = *self;
-    let count = ring.len();
-    if count < 2 {
-        weights.fill(1.0);
-        return;
-    }
-    let place = |u: usize| &places[u * dims..(u + 1) * dims];
-    let mut centre = [0.0; 64];
-    let centre = &mut centre[..dims];
-    for u in ring {
-        for (c, x) in centre.iter_mut().zip(place(*u as usize)) {
-            *c += x / count as f64;
-        }
-    }
-    let inner = |a: usize, b: usize| {
-        let pairs = place(a).iter().zip(place(b)).zip(centre.iter());
-        pairs.fold(0.0, |sum, ((x, y), c)| sum + (x - c) * (y - c))
-    };
-    let apart = |a: usize, b: usize| {
-        let pairs = place(a).iter().zip(place(b));
-        pairs.fold(0.0, |sum, (x, y)| sum + (x - y) * (x - y))
-    };
-    let spread = ring.iter().fold(0.0, |sum, u| sum + inner(*u as usize, *u as usize));
-    let scale = count as f64 / spread;
-    if !scale.is_finite() {
-        weights.fill(1.0 / count as f64);
-        return;
-    }
-    // The covariance of two places, up to what the weights' sum of one takes away.
-    let between = |a: usize, b: usize| {
-        let squared = apart(a, b) * scale;
-        // To the power of 15/8 of the distance: rough enough to be stable, smooth enough to curve.
-        let root = squared.sqrt().sqrt().sqrt().sqrt();
-        let power = if root > 0.0 { squared / root } else { 0.0 };
-        affine * scale * inner(a, b) - power
-    };
-    let n = count + 1;
-    system.clear();
-    system.resize(n * (n + 1), 0.0);
-    for (i, a) in ring.iter().enumerate() {
-        let row = i * (n + 1);
-        for (j, b) in ring.iter().enumerate().take(i) {
-            let value = between(*a as usize, *b as usize);
-            system[row + j] = value;
-            system[j * (n + 1) + i] = value;
-        }
-        system[row + i] = between(*a as usize, *a as usize) + NOISE;
-        system[row + count] = 1.0;
-        system[row + n] = between(*a as usize, rank);
-        system[count * (n + 1) + i] = 1.0;
-    }
-    system[count * (n + 1) + n] = 1.0;
-    solve(system, n);
-    for (i, weight) in weights.iter_mut().enumerate() {
-        *weight = system[i * (n + 1) + n];
-    }
-}
+/// Room for the system of one ring.
+#[derive(Default)]
+struct Room {
+    /// Places less their centre, in units of their spread; the last is that of the vertex itself.
+    local: Vec<f64>,
+    /// The lower half of the covariances, row by row, and then of their root.
+    matrix: Vec<f64>,
+    /// What is solved for: the covariances with the vertex, and ones.
+    sides: [Vec<f64>; 2],
 }
 
-/// Solves a system of `n` rows of `n + 1` numbers, the last of which are the right side; the solution
-/// stands there after it. By elimination with the largest pivot of a column.
-fn solve(system: &mut [f64], n: usize) {
-    let width = n + 1;
-    for i in 0..n {
-        let size = |r: usize| system[r * width + i].abs();
-        let pivot = (i + 1..n).fold(i, |best, r| if size(r) > size(best) { r } else { best });
-        if pivot != i {
-            let (above, below) = system.split_at_mut(pivot * width);
-            above[i * width..(i + 1) * width].swap_with_slice(&mut below[..width]);
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).fold(0.0, |sum, (x, y)| sum + x * y)
+}
+
+impl Places<'_> {
+    /// Ring and vertex in local coordinates; false where they have none.
+    fn localise(&self, ring: &[u32], rank: usize, room: &mut Room) -> bool {
+        let Places { places, dims, .. } = *self;
+        let local = &mut room.local;
+        local.clear();
+        for u in ring.iter().map(|u| *u as usize).chain([rank]) {
+            local.extend_from_slice(&places[u * dims..(u + 1) * dims]);
         }
-        let (above, below) = system.split_at_mut((i + 1) * width);
-        let row = &above[i * width..];
-        if row[i] == 0.0 {
-            continue;
-        }
-        for other in below.chunks_exact_mut(width) {
-            let factor = other[i] / row[i];
-            if factor != 0.0 {
-                for (o, r) in other[i + 1..].iter_mut().zip(&row[i + 1..]) {
-                    *o -= factor * r;
-                }
+        let (around, _) = local.split_at(ring.len() * dims);
+        let mut centre = [0.0; MOST_DIMS];
+        for place in around.chunks_exact(dims) {
+            for (c, x) in centre.iter_mut().zip(place) {
+                *c += x / ring.len() as f64;
             }
         }
+        for place in local.chunks_exact_mut(dims) {
+            for (x, c) in place.iter_mut().zip(&centre) {
+                *x -= c;
+            }
+        }
+        let around = &local[..ring.len() * dims];
+        let scale = (ring.len() as f64 / dot(around, around)).sqrt();
+        local.iter_mut().for_each(|x| *x *= scale);
+        scale.is_finite()
     }
-    for i in (0..n).rev() {
-        let sum = (i + 1..n).fold(system[i * width + n], |sum, c| {
-            sum - system[i * width + c] * system[c * width + n]
-        });
-        let pivot = system[i * width + i];
-        system[i * width + n] = if pivot == 0.0 { 0.0 } else { sum / pivot };
+
+    /// The covariance of two places whose products are known, up to what the weights' sum of one takes
+    /// away: that of an affine function and of a smooth one.
+    fn covariance(&self, a: f64, b: f64, product: f64) -> f64 {
+        let apart = (a + b - 2.0 * product).max(0.0);
+        self.affine * product + REACH / (1.0 + apart / REACH)
+    }
+
+    /// The weights of one ring.
+    fn krige(&self, ring: &[u32], rank: usize, room: &mut Room, weights: &mut [f64]) {
+        let (count, dims) = (ring.len(), self.dims);
+        if count < 2 || !self.localise(ring, rank, room) {
+            weights.fill(1.0 / count as f64);
+            return;
+        }
+        let Room {
+            local,
+            matrix,
+            sides,
+        } = room;
+        let place = |i: usize| &local[i * dims..(i + 1) * dims];
+        let mut lengths = [0.0; MOST_RING + 1];
+        for (i, length) in lengths[..=count].iter_mut().enumerate() {
+            *length = dot(place(i), place(i));
+        }
+        matrix.clear();
+        for i in 0..count {
+            for j in 0..i {
+                let product = dot(place(i), place(j));
+                matrix.push(self.covariance(lengths[i], lengths[j], product));
+            }
+            matrix.push(self.covariance(lengths[i], lengths[i], lengths[i]) + NOISE);
+        }
+        let [with, ones] = sides;
+        with.clear();
+        with.extend((0..count).map(|i| {
+            let product = dot(place(i), place(count));
+            self.covariance(lengths[i], lengths[count], product)
+        }));
+        ones.clear();
+        ones.resize(count, 1.0);
+        root(matrix, count);
+        solve(matrix, with);
+        solve(matrix, ones);
+        let share = (1.0 - with.iter().sum::<f64>()) / ones.iter().sum::<f64>();
+        for (weight, (with, one)) in weights.iter_mut().zip(with.iter().zip(ones.iter())) {
+            *weight = with + share * one;
+        }
+    }
+}
+
+/// Where row `i` of the lower half of a matrix begins.
+const fn row(i: usize) -> usize {
+    i * (i + 1) / 2
+}
+
+/// The root of a positive definite matrix, in its place (Cholesky).
+fn root(matrix: &mut [f64], count: usize) {
+    for i in 0..count {
+        let (above, below) = matrix.split_at_mut(row(i));
+        let this = &mut below[..=i];
+        for j in 0..i {
+            let other = &above[row(j)..=row(j) + j];
+            this[j] = (this[j] - dot(&this[..j], &other[..j])) / other[j];
+        }
+        let (known, last) = this.split_at_mut(i);
+        // Below this there is nothing but rounding: the noise alone is larger.
+        last[0] = (last[0] - dot(known, known)).max(0.5 * NOISE).sqrt();
+    }
+}
+
+/// Solves for one right side, given the root.
+fn solve(root: &[f64], side: &mut [f64]) {
+    for i in 0..side.len() {
+        let this = &root[row(i)..=row(i) + i];
+        side[i] = (side[i] - dot(&this[..i], &side[..i])) / this[i];
+    }
+    for i in (0..side.len()).rev() {
+        let this = &root[row(i)..=row(i) + i];
+        side[i] /= this[i];
+        let value = side[i];
+        for (side, x) in side[..i].iter_mut().zip(this) {
+            *side -= value * x;
+        }
     }
 }
 

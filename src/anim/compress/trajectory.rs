@@ -65,13 +65,16 @@ pub struct Encoded {
     pub components: usize,
 }
 
+/// Vertices that are computed together.
+pub const LANES: usize = 8;
+
 /// The components of a window that are known.
 #[derive(Debug, Clone, Default)]
 pub struct Components {
     /// The mean position of each vertex.
     pub means: Vec<Vec3>,
-    /// For each component the weight of each vertex.
-    pub weights: Vec<Vec<f64>>,
+    /// The weights of [`LANES`] vertices together: for each such block one row for each component.
+    pub weights: Vec<[f64; LANES]>,
     /// For each component `3 F` numbers: for every axis a cosine transform over the frames.
     pub directions: Vec<Vec<f64>>,
 }
@@ -567,11 +570,13 @@ pub fn decode(
     }
     let root = (frames as f64).sqrt();
     let mut means = vec![[0.0; 3]; hierarchy.len()];
-    let mut weights = vec![vec![0.0; hierarchy.len()]; state.held.len()];
-    for (rank, v) in hierarchy.vertices.iter().enumerate() {
-        means[*v as usize] = std::array::from_fn(|axis| shape[axis][rank] / root);
-        for (weights, held) in weights.iter_mut().zip(&state.held) {
-            weights[*v as usize] = held[rank];
+    let count = state.held.len();
+    let mut weights = vec![[0.0; LANES]; hierarchy.len().div_ceil(LANES) * count];
+    for (rank, v) in hierarchy.vertices.iter().map(|v| *v as usize).enumerate() {
+        means[v] = std::array::from_fn(|axis| shape[axis][rank] / root);
+        let rows = &mut weights[v / LANES * count..(v / LANES + 1) * count];
+        for (row, held) in rows.iter_mut().zip(&state.held) {
+            row[v % LANES] = held[rank];
         }
     }
     Ok(Components {
@@ -597,7 +602,6 @@ impl Components {
                 })
             })
             .collect();
-        const LANES: usize = 8;
         for (block, out) in out.chunks_mut(LANES).enumerate() {
             let first = block * LANES;
             let mut sums = [[0.0; LANES]; 3];
@@ -606,15 +610,11 @@ impl Components {
                     sums[axis][i] = mean[axis];
                 }
             }
-            for (motion, weights) in motions.iter().zip(&self.weights) {
-                let mut lanes = [0.0; LANES];
-                match weights[first..].first_chunk() {
-                    Some(whole) => lanes = *whole,
-                    None => lanes[..out.len()].copy_from_slice(&weights[first..]),
-                }
+            let weights = &self.weights[block * motions.len()..(block + 1) * motions.len()];
+            for (motion, weights) in motions.iter().zip(weights) {
                 for axis in 0..3 {
                     for i in 0..LANES {
-                        sums[axis][i] += motion[axis] * lanes[i];
+                        sums[axis][i] += motion[axis] * weights[i];
                     }
                 }
             }
