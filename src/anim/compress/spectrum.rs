@@ -215,6 +215,11 @@ impl Cosines {
         }
     }
 
+    /// Number of frames.
+    pub fn frames(&self) -> usize {
+        self.frames
+    }
+
     /// One frequency at all frames.
     pub fn frequency(&self, k: usize) -> &[f64] {
         &self.table[k * self.frames..(k + 1) * self.frames]

@@ -26,6 +26,8 @@ use rayon::prelude::*;
 const PRICE: f64 = 0.08;
 /// The step of a direction in terms of that of its weights.
 const COARSER: f64 = 1.8;
+/// How much more affine functions of the place are expected of weights than any other.
+pub const AFFINE: f64 = 100.0;
 /// Numbers of components after which weights are foreseen anew.
 const STAGES: [usize; 5] = [1, 2, 4, 8, 16];
 /// Components that do not pay before no more are tried.
@@ -587,10 +589,11 @@ pub fn decode(
 }
 
 impl Components {
-    /// Positions at one frame of the window, in local coordinates, of so many frames in all.
+    /// Positions at one frame of the window, in local coordinates.
     ///
     /// Cost: three products for each vertex and component.
-    pub fn frame(&self, cosines: &Cosines, frame: usize, frames: usize, out: &mut [Vec3]) {
+    pub fn frame(&self, cosines: &Cosines, frame: usize, out: &mut [Vec3]) {
+        let frames = cosines.frames();
         let motions: Vec<Vec3> = self
             .directions
             .iter()
