@@ -1,5 +1,6 @@
 //! Animations: one mesh whose vertices move.
 
 pub mod clip;
+pub mod motion;
 
 pub use clip::Clip;

@@ -13,6 +13,7 @@ pub mod gltf;
 mod header;
 mod hybrid36;
 pub mod json;
+pub mod mdd;
 pub mod metaimage;
 pub mod mmcif;
 pub mod nifti;
@@ -20,11 +21,13 @@ pub mod npy;
 pub mod nrrd;
 pub mod obj;
 pub mod off;
+pub mod pc2;
 pub mod pdb;
 #[cfg(test)]
 mod peers;
 pub mod ply;
 pub mod png;
+mod pointcache;
 pub mod pqr;
 pub mod refusal;
 mod samples;
@@ -43,6 +46,7 @@ mod roundtrip;
 #[cfg(test)]
 mod written_volume;
 
+use crate::anim::Clip;
 use crate::error::{Error, Fault, Result};
 use crate::image::samples::Image;
 use crate::mesh::{Mesh, Polygons};
@@ -69,6 +73,8 @@ pub enum Content {
     Image(Image),
     /// Atoms.
     Molecule(Molecule),
+    /// A mesh, or a cloud, whose vertices move.
+    Animation(Clip),
     /// JSON documents, in the order of the file.
     Report(Vec<Value>),
 }
@@ -81,6 +87,7 @@ impl Content {
             Content::Volume(_) => Kind::Volume,
             Content::Image(_) => Kind::Image,
             Content::Molecule(_) => Kind::Molecule,
+            Content::Animation(_) => Kind::Animation,
             Content::Report(_) => Kind::Report,
         }
     }
@@ -109,6 +116,7 @@ pub fn read(source: &Source, format: Option<Format>) -> Result<(Content, Input, 
         Content::Volume(volume) => volume.content(),
         Content::Image(image) => image.content(),
         Content::Molecule(molecule) => molecule.content(),
+        Content::Animation(clip) => clip.content(),
         Content::Report(documents) => report::Content {
             documents: Some(documents.len() as u64),
             ..report::Content::default()
@@ -144,6 +152,8 @@ fn parse(source: &Source, format: Format, warnings: &mut Vec<Warning>) -> Result
         Format::Pqr => Content::Molecule(pqr::read(source, warnings)?),
         Format::Xyzr => Content::Molecule(xyzr::read(source, warnings)?),
         Format::SpheresCsv => Content::Molecule(xyzr::read_csv(source, warnings)?),
+        Format::Pc2 => Content::Animation(pc2::read(source, warnings)?),
+        Format::Mdd => Content::Animation(mdd::read(source, warnings)?),
         Format::Json => Content::Report(json::read(source, warnings)?),
         Format::Vdb => return Err(Fault::whole("vdb files are written, not read").into()),
     };
@@ -152,6 +162,7 @@ fn parse(source: &Source, format: Format, warnings: &mut Vec<Warning>) -> Result
         Content::Volume(volume) => volume.check()?,
         Content::Image(image) => image.check()?,
         Content::Molecule(molecule) => molecule.check()?,
+        Content::Animation(clip) => clip.check()?,
         Content::Report(_) => {}
     }
     Ok(content)
@@ -228,6 +239,22 @@ pub fn read_molecule(
     match read(source, format)? {
         (Content::Molecule(molecule), input, warnings) => Ok((molecule, input, warnings)),
         (other, input, _) => Err(wrong_kind(source, &input.format, &other, &[Kind::Molecule])),
+    }
+}
+
+/// Reads an animation; a file of another kind is an error.
+pub fn read_animation(
+    source: &Source,
+    format: Option<Format>,
+) -> Result<(Clip, Input, Vec<Warning>)> {
+    match read(source, format)? {
+        (Content::Animation(clip), input, warnings) => Ok((clip, input, warnings)),
+        (other, input, _) => Err(wrong_kind(
+            source,
+            &input.format,
+            &other,
+            &[Kind::Animation],
+        )),
     }
 }
 
@@ -335,6 +362,55 @@ fn dropped_of_molecule(molecule: &Molecule, format: Format) -> Vec<Warning> {
         }
         _ => {}
     }
+    lost
+}
+
+/// Writes an animation. Returns the lines for the report and warnings about what the format cannot
+/// hold.
+pub fn write_animation(
+    clip: &Clip,
+    sink: &Sink,
+    format: Format,
+) -> Result<(Vec<Output>, Vec<Warning>)> {
+    let writer: fn(&Clip, &mut dyn Write) -> std::io::Result<()> = match format {
+        Format::Pc2 => pc2::write,
+        Format::Mdd => mdd::write,
+        _ => return Err(cannot_hold(format, Kind::Animation)),
+    };
+    let output = sink.write(format, |out| writer(clip, out))?;
+    Ok((vec![output], dropped_of_clip(clip, format)))
+}
+
+/// What of an animation a cache of points leaves out.
+fn dropped_of_clip(clip: &Clip, format: Format) -> Vec<Warning> {
+    let mut lost = Vec::new();
+    let mut note = |code: &str, message: String, count: u64, first: Option<u64>| {
+        if count > 0 {
+            lost.push(Warning::new(code, message, count, first));
+        }
+    };
+    let (name, mesh) = (format.name(), &clip.mesh);
+    let parts = [
+        ("dropped-faces", "faces", mesh.face_count()),
+        ("dropped-segments", "polylines", mesh.segments.len()),
+        (
+            "dropped-normals",
+            "vertex normals",
+            mesh.normals.as_ref().map_or(0, Vec::len),
+        ),
+        (
+            "dropped-colours",
+            "vertex colours",
+            mesh.colors.as_ref().map_or(0, Vec::len),
+        ),
+    ];
+    for (code, what, count) in parts {
+        let message = format!("{name} files hold no {what}; left out");
+        note(code, message, count as u64, None);
+    }
+    let (count, first) = pointcache::rounded(clip);
+    let message = format!("positions that {name} files, in single precision, round");
+    note("rounded-coordinates", message, count, first);
     lost
 }
 
