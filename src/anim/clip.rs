@@ -116,7 +116,7 @@ impl Clip {
         if vertices == 0 || self.positions.is_empty() {
             return Err(Fault::whole("holds no vertices or no frames"));
         }
-        if self.positions.len() % vertices != 0 {
+        if !self.positions.len().is_multiple_of(vertices) {
             let problem = format!(
                 "{} positions are no whole number of frames of {vertices} vertices",
                 self.positions.len()
