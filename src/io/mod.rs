@@ -31,6 +31,7 @@ mod pointcache;
 pub mod pqr;
 pub mod refusal;
 mod samples;
+pub mod sequence;
 pub mod sink;
 pub mod source;
 pub mod stl;
