@@ -123,14 +123,19 @@ pub fn read(source: &Source, format: Option<Format>) -> Result<(Content, Input, 
             ..report::Content::default()
         },
     };
-    let input = Input {
+    let input = input(source, format, digest, described);
+    Ok((content, input, warnings))
+}
+
+/// The line of an input for the report.
+fn input(source: &Source, format: Format, digest: String, content: report::Content) -> Input {
+    Input {
         path: source.name().to_owned(),
         format: format.name().to_owned(),
         bytes: source.stored_bytes(),
         sha256: digest,
-        content: described,
-    };
-    Ok((content, input, warnings))
+        content,
+    }
 }
 
 fn parse(source: &Source, format: Format, warnings: &mut Vec<Warning>) -> Result<Content, Refusal> {
@@ -259,6 +264,32 @@ pub fn read_animation(
     }
 }
 
+/// Reads an animation of a glTF file, sampled `fps` times a second; see [`gltf::read_clip`].
+///
+/// `animation` names one or is its number, the first is taken without it. Errs for a file of any other
+/// format too.
+pub fn read_gltf_clip(
+    source: &Source,
+    format: Option<Format>,
+    fps: f64,
+    animation: Option<&str>,
+) -> Result<(Clip, Input, Vec<Warning>)> {
+    let failed = |refusal: Refusal| refusal.of(source);
+    let format = match format {
+        Some(format) => format,
+        None => format::sniff(source.bytes(), source.extension()).map_err(|f| failed(f.into()))?,
+    };
+    if !matches!(format, Format::Gltf | Format::Glb) {
+        let problem = format!("is {}, but glTF is needed", format.name());
+        return Err(failed(Fault::whole(problem).into()));
+    }
+    let mut warnings = Vec::new();
+    let clip = gltf::read_clip(source, fps, animation, &mut warnings).map_err(failed)?;
+    clip.check().map_err(|fault| failed(fault.into()))?;
+    let input = input(source, format, source.sha256(), clip.content());
+    Ok((clip, input, warnings))
+}
+
 /// Reads JSON documents; a file of another kind is an error.
 pub fn read_report(
     source: &Source,
@@ -366,8 +397,8 @@ fn dropped_of_molecule(molecule: &Molecule, format: Format) -> Vec<Warning> {
     lost
 }
 
-/// Writes an animation. Returns the lines for the report and warnings about what the format cannot
-/// hold.
+/// Writes an animation in one file: a cache of points, or GLB. Returns the lines for the report and
+/// warnings about what the format cannot hold.
 pub fn write_animation(
     clip: &Clip,
     sink: &Sink,
@@ -376,42 +407,59 @@ pub fn write_animation(
     let writer: fn(&Clip, &mut dyn Write) -> std::io::Result<()> = match format {
         Format::Pc2 => pc2::write,
         Format::Mdd => mdd::write,
+        Format::Glb => gltf::write_clip,
         _ => return Err(cannot_hold(format, Kind::Animation)),
     };
     let output = sink.write(format, |out| writer(clip, out))?;
     Ok((vec![output], dropped_of_clip(clip, format)))
 }
 
-/// What of an animation a cache of points leaves out.
+/// What of an animation a format leaves out.
 fn dropped_of_clip(clip: &Clip, format: Format) -> Vec<Warning> {
-    let mut lost = Vec::new();
-    let mut note = |code: &str, message: String, count: u64, first: Option<u64>| {
-        if count > 0 {
-            lost.push(Warning::new(code, message, count, first));
-        }
-    };
     let (name, mesh) = (format.name(), &clip.mesh);
+    let is_cache = format != Format::Glb;
+    let normals = mesh
+        .normals
+        .as_ref()
+        .filter(|_| is_cache || clip.frames() > 1);
+    let of_caches = |count: usize| if is_cache { count } else { 0 };
     let parts = [
-        ("dropped-faces", "faces", mesh.face_count()),
-        ("dropped-segments", "polylines", mesh.segments.len()),
+        ("dropped-faces", "faces", of_caches(mesh.face_count())),
+        (
+            "dropped-segments",
+            "polylines",
+            of_caches(mesh.segments.len()),
+        ),
         (
             "dropped-normals",
-            "vertex normals",
-            mesh.normals.as_ref().map_or(0, Vec::len),
+            "normals of moving vertices",
+            normals.map_or(0, Vec::len),
         ),
         (
             "dropped-colours",
             "vertex colours",
-            mesh.colors.as_ref().map_or(0, Vec::len),
+            of_caches(mesh.colors.as_ref().map_or(0, Vec::len)),
+        ),
+        (
+            "split-polygons",
+            "faces of more than three corners",
+            mesh.polygons
+                .as_ref()
+                .filter(|_| !is_cache)
+                .map_or(0, Polygons::len),
         ),
     ];
-    for (code, what, count) in parts {
-        let message = format!("{name} files hold no {what}; left out");
-        note(code, message, count as u64, None);
+    let parts = parts.into_iter().filter(|(_, _, count)| *count > 0);
+    let mut lost: Vec<Warning> = parts
+        .map(|(code, what, count)| {
+            let message = format!("{name} files hold no {what}; left out");
+            Warning::new(code, message, count as u64, None)
+        })
+        .collect();
+    if is_cache && let (count @ 1.., first) = pointcache::rounded(clip) {
+        let message = format!("positions that {name} files, in single precision, round");
+        lost.push(Warning::new("rounded-coordinates", message, count, first));
     }
-    let (count, first) = pointcache::rounded(clip);
-    let message = format!("positions that {name} files, in single precision, round");
-    note("rounded-coordinates", message, count, first);
     lost
 }
 
