@@ -114,7 +114,7 @@ fn frames(end: f64, fps: f64) -> Result<u64, Fault> {
         return Err(Fault::whole(problem));
     }
     let slack = WHOLE.max(f64::from(f32::EPSILON) * steps);
-    Ok((steps - slack).ceil().max(0.0) as u64 + 1)
+    Ok(((steps - slack).ceil().max(0.0) as u64).saturating_add(1))
 }
 
 #[cfg(test)]

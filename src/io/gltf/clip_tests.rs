@@ -278,7 +278,7 @@ fn tracks_that_do_not_fit_are_refused() {
     let two = [0.0, 1.0];
     assert_eq!(
         said(0, "translation", "LINEAR", (&[1.0, 1.0], "VEC3", &[0.0; 6])),
-        "accessor 4: the times of keys do not rise: 1 of key 0, 1 of the next"
+        "accessor 5: the times of keys do not rise: 1 of key 0, 1 of the next"
     );
     assert_eq!(
         said(
@@ -287,19 +287,19 @@ fn tracks_that_do_not_fit_are_refused() {
             "LINEAR",
             (&[0.0, f32::NAN], "VEC3", &[0.0; 6])
         ),
-        "accessor 4: the time NaN of key 1 is not finite"
+        "accessor 5: the time NaN of key 1 is not finite"
     );
     assert_eq!(
         said(0, "scale", "CUBICSPLINE", (&two, "VEC3", &[1.0; 6])),
-        "accessor 5: 2 values for 2 keys of 1 each, but 6 are needed for CUBICSPLINE"
+        "accessor 6: 2 values for 2 keys of 1 each, but 6 are needed for CUBICSPLINE"
     );
     assert_eq!(
         said(0, "weights", "LINEAR", (&two, "SCALAR", &[1.0; 2])),
-        "accessor 5: 2 values for 2 keys of 2 each, but 4 are needed for LINEAR"
+        "accessor 6: 2 values for 2 keys of 2 each, but 4 are needed for LINEAR"
     );
     assert_eq!(
         said(0, "rotation", "SLERP", (&two, "VEC4", &[1.0; 8])),
-        "accessor 5: is interpolated by \"SLERP\", which is no way"
+        "accessor 6: is interpolated by \"SLERP\", which is no way"
     );
     assert_eq!(
         said(7, "rotation", "LINEAR", (&two, "VEC4", &[1.0; 8])),
