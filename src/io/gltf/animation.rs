@@ -395,6 +395,11 @@ fn track<const N: usize>(
         return Err(fault(input, problem).into());
     }
     let values = reader.vectors::<N>(output, N..=N, [0.0; N])?;
+    let is_broken = |value: &[f64; N]| value.iter().any(|c| !c.is_finite());
+    if let Some(at) = values.iter().position(is_broken) {
+        let problem = format!("value {at}, {:?}, is not finite", values[at]);
+        return Err(fault(output, problem).into());
+    }
     let groups = match interpolation {
         Interpolation::Cubic => 3,
         _ => 1,
