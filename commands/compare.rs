@@ -8,7 +8,7 @@ use crate::words;
 use scantle::error::{Error, Fault, Result, number};
 use scantle::image::samples::Image;
 use scantle::io::Content;
-use scantle::io::format::Format;
+use scantle::io::format::{Format, Kind};
 use scantle::measure::image_difference::{self, ImageDifference};
 use scantle::measure::mesh_distance::{self, MeshDifference};
 use scantle::measure::report_difference::{self, ReportDifference};
@@ -110,16 +110,20 @@ pub fn run(args: &Args) -> Result<Exit> {
             Content::Volume(a) => volumes(job, &a, args),
             Content::Image(a) => images(job, &a, args),
             Content::Report(a) => reports(job, &a, args),
-            Content::Molecule(_) => Err(no_measure(job)),
+            Content::Molecule(_) => Err(no_measure(job, Kind::Molecule)),
+            Content::Animation(_) => Err(no_measure(job, Kind::Animation)),
         };
         Ok(found?.check("tolerance", args.tolerance))
     })
 }
 
 /// The error of a kind that there is no measure for.
-fn no_measure(job: &Job) -> Error {
+fn no_measure(job: &Job, kind: Kind) -> Error {
     let format = job.input().map_or("", |input| input.format.as_str());
-    let problem = format!("holds a molecule ({format}), which has no measure here");
+    let problem = format!(
+        "holds {} ({format}), which has no measure here",
+        kind.with_article()
+    );
     let hint = "two meshes, volumes, images or reports can be compared";
     Error::Geometry(Fault::whole(problem).with_hint(hint))
 }

@@ -11,9 +11,9 @@ use scantle::io::format::{Format, Kind};
 use schemars::JsonSchema;
 use serde::Serialize;
 
-/// Write a mesh, a volume, an image or a molecule in another format
+/// Write a mesh, a volume, an image, a molecule or an animation in another format
 ///
-/// Vertices, faces, voxels, pixels, atoms and their order stay as they are. What the output format cannot
+/// Vertices, faces, voxels, pixels, atoms, frames and their order stay as they are. What the output format cannot
 /// hold is left out, and a warning counts it.
 #[derive(Debug, clap::Args)]
 #[command(after_long_help = EXAMPLES)]
@@ -42,7 +42,7 @@ pub struct Params {
 /// What was done.
 #[derive(Debug, Serialize, JsonSchema)]
 pub struct Stats {
-    /// What was converted: `mesh`, `volume`, `image` or `molecule`.
+    /// What was converted: `mesh`, `volume`, `image`, `molecule` or `animation`.
     kind: &'static str,
 }
 
@@ -67,6 +67,7 @@ fn convert(job: &mut Job) -> Result<Found<Params, Stats>> {
         io::Content::Volume(volume) => job.write_volume(volume)?,
         io::Content::Image(image) => job.write_image(image)?,
         io::Content::Molecule(molecule) => job.write_molecule(molecule)?,
+        io::Content::Animation(clip) => job.write_animation(clip)?,
         io::Content::Report(_) => {
             let fault = Fault::whole("holds a report (json), which is written in no other format");
             let hint = "scantle info and scantle compare take reports";

@@ -38,7 +38,7 @@ pub struct Table {
 struct Row {
     /// Its name, for `--input-format` and `--output-format`.
     name: &'static str,
-    /// What it holds: `mesh`, `volume`, `image`, `molecule` or `report`.
+    /// What it holds: `mesh`, `volume`, `image`, `molecule`, `animation` or `report`.
     kind: &'static str,
     /// File name extensions, the usual one first.
     extensions: &'static [&'static str],
@@ -73,7 +73,7 @@ pub fn run(args: &Args) -> Result<Exit> {
 
 fn table(formats: &[Row]) -> String {
     let mut text = format!(
-        "{:<11} {:<8} {:<5} {:<6} about\n",
+        "{:<11} {:<9} {:<5} {:<6} about\n",
         "name", "kind", "read", "write"
     );
     let yes = |there| if there { "yes" } else { "-" };
@@ -81,7 +81,7 @@ fn table(formats: &[Row]) -> String {
         let (read, write) = (yes(row.read), yes(row.write));
         let _ = writeln!(
             text,
-            "{:<11} {:<8} {read:<5} {write:<6} {}",
+            "{:<11} {:<9} {read:<5} {write:<6} {}",
             row.name, row.kind, row.about
         );
     }

@@ -5,7 +5,8 @@ use crate::exit::Exit;
 use crate::job::{Found, Job};
 use crate::shared::{Common, Inputs};
 use crate::words;
-use scantle::error::Result;
+use scantle::anim::motion::{Motion, motion};
+use scantle::error::{Result, number};
 use scantle::io::Content;
 use scantle::mesh::topology::{Topology, topology};
 use scantle::protein::inventory::{Inventory, inventory};
@@ -18,7 +19,7 @@ use serde::Serialize;
 ///
 /// Counts, bounds and, of a mesh, its topology: whether it is closed, oriented and manifold. Of a
 /// volume, where it is, what is set and the range of values; of an image, its size and samples; of a
-/// molecule, its chains, residues and elements. Of JSON, the documents, and which commands they are
+/// molecule, its chains, residues and elements; of an animation, its frames and what of it moves. Of JSON, the documents, and which commands they are
 /// reports of.
 #[derive(Debug, clap::Args)]
 #[command(after_long_help = EXAMPLES)]
@@ -54,6 +55,8 @@ pub enum Stats {
     Image(ImageStats),
     /// Atoms.
     Molecule(Box<Inventory>),
+    /// A mesh, or a cloud, whose vertices move.
+    Animation(Motion),
     /// JSON documents.
     Report(ReportStats),
 }
@@ -140,6 +143,16 @@ fn look(job: &mut Job) -> Result<Found<Params, Stats>> {
             job.warn(inventory.warnings());
             summary += &chains_in_words(&inventory);
             Stats::Molecule(Box::new(inventory))
+        }
+        Content::Animation(clip) => {
+            let motion = motion(&clip, job.progress());
+            job.warn(motion.warnings());
+            summary += &format!(
+                " at {} a second, {} of the vertices move",
+                number(motion.rate),
+                motion.moving_vertices
+            );
+            Stats::Animation(motion)
         }
         Content::Report(documents) => {
             let reports = made_by(&documents);

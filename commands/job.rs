@@ -7,6 +7,7 @@ use crate::machine::{Moment, peak_bytes};
 use crate::progress::Recorder;
 use crate::streams::{complain, say};
 use crate::words;
+use scantle::anim::Clip;
 use scantle::error::{Error, Result, number};
 use scantle::image::samples::Image;
 use scantle::io::format::{Format, Kind};
@@ -291,6 +292,11 @@ impl<'a> Job<'a> {
     /// Writes the result, if the user wants it.
     pub fn write_molecule(&mut self, molecule: &Molecule) -> Result<()> {
         self.write_with(|sink, format| io::write_molecule(molecule, sink, format))
+    }
+
+    /// Writes the result, if the user wants it.
+    pub fn write_animation(&mut self, clip: &Clip) -> Result<()> {
+        self.write_with(|sink, format| io::write_animation(clip, sink, format))
     }
 
     fn write_with(

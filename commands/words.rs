@@ -27,6 +27,7 @@ pub fn content(content: &Content) -> String {
         (content.atoms, "atom", "atoms"),
         (content.residues, "residue", "residues"),
         (content.models, "model", "models"),
+        (content.frames, "frame", "frames"),
         (content.documents, "document", "documents"),
     ];
     for (count, one, many) in counts {

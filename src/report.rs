@@ -283,6 +283,11 @@ impl Tally {
         self.first = self.first.or(later.first);
     }
 
+    /// How many there are.
+    pub fn count(self) -> u64 {
+        self.count
+    }
+
     /// The place of the first.
     pub fn first(self) -> Option<u64> {
         self.first

@@ -46,8 +46,8 @@ const MAY_USE: &[(&str, &[&str])] = &[
     (
         "measure",
         &[
-            "anim", "error", "image", "mesh", "numeric", "progress", "protein", "report", "spatial",
-            "trade", "volume",
+            "anim", "error", "image", "mesh", "numeric", "progress", "protein", "report",
+            "spatial", "trade", "volume",
         ],
     ),
     // Data types only: a reader calls no algorithm.

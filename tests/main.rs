@@ -5,6 +5,7 @@
 mod support;
 mod surfaces;
 
+mod animations;
 mod atomic;
 mod chapter;
 mod cli;

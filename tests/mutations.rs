@@ -67,6 +67,8 @@ const MADE: &[(&str, &str)] = &[
     ("a.cif", "convert fixtures/molecules/helix.pdb -o a.cif"),
     ("a.xyzr", "convert fixtures/molecules/ring.csv -o a.xyzr"),
     ("a.csv", "convert fixtures/molecules/ring.xyzr -o a.csv"),
+    ("a.pc2", "convert fixtures/animations/wave.mdd -o a.pc2"),
+    ("a.mdd", "convert fixtures/animations/wave.pc2 -o a.mdd"),
 ];
 
 /// Files that are read but not written like this.

@@ -28,7 +28,7 @@ pub fn read(name: &str, format: Option<Format>) -> Result<(Subject, Input)> {
             })?;
             Subject::Atoms(selected.balls)
         }
-        Content::Volume(_) | Content::Image(_) | Content::Report(_) => {
+        Content::Volume(_) | Content::Image(_) | Content::Animation(_) | Content::Report(_) => {
             unreachable!("the reader was told which kinds there may be")
         }
     };

@@ -25,6 +25,44 @@ impl Clip {
     /// Frames per second where a file names none.
     pub const DEFAULT_RATE: f64 = 24.0;
 
+    /// A clip of points alone: `vertices` of them in each frame, all in `positions`, of which the
+    /// first frame makes the mesh. Fewer positions than that make a clip without vertices.
+    pub fn cloud(vertices: usize, positions: Vec<Vec3>, start: f64, rate: f64) -> Clip {
+        let first = positions.get(..vertices).unwrap_or_default().to_vec();
+        let mesh = Mesh {
+            points: (0..first.len() as u32).collect(),
+            positions: first,
+            ..Mesh::default()
+        };
+        Clip {
+            mesh,
+            positions,
+            start,
+            rate,
+        }
+    }
+
+    /// The clip with the faces, polylines, labels and colours of a mesh, vertex for vertex.
+    ///
+    /// The positions stay the clip's; normals come along only where the mesh is its very first frame.
+    /// Errs where the two do not have the same number of vertices.
+    pub fn with_base(self, base: Mesh) -> Result<Clip, Fault> {
+        let (vertices, others) = (self.vertices(), base.positions.len());
+        if vertices != others {
+            let problem =
+                format!("the animation has {vertices} vertices, but its base mesh {others}");
+            return Err(Fault::whole(problem));
+        }
+        let first = self.mesh.positions;
+        let normals = base.normals.filter(|_| base.positions == first);
+        let mesh = Mesh {
+            positions: first,
+            normals,
+            ..base
+        };
+        Ok(Clip { mesh, ..self })
+    }
+
     /// Vertices of every frame.
     pub fn vertices(&self) -> usize {
         self.mesh.positions.len()
@@ -78,7 +116,7 @@ impl Clip {
         if vertices == 0 || self.positions.is_empty() {
             return Err(Fault::whole("holds no vertices or no frames"));
         }
-        if self.positions.len() % vertices != 0 {
+        if !self.positions.len().is_multiple_of(vertices) {
             let problem = format!(
                 "{} positions are no whole number of frames of {vertices} vertices",
                 self.positions.len()
@@ -113,5 +151,32 @@ impl Clip {
             bounds: (!bounds.is_empty()).then_some([bounds.lo, bounds.hi]),
             ..self.mesh.content()
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_base_gives_faces_to_its_own_number_of_vertices() {
+        let at = |z: f64| [[0.0, 0.0, z], [1.0, 0.0, z], [0.0, 1.0, z]];
+        let positions = [at(0.0), at(1.0)].concat();
+        let clip = Clip::cloud(3, positions, 0.0, 24.0);
+        assert_eq!((clip.frames(), clip.mesh.points.len()), (2, 3));
+        let mut base = Mesh::from_triangles(at(5.0).to_vec(), vec![[0, 1, 2]]);
+        base.normals = Some(vec![[0.0, 0.0, 1.0]; 3]);
+        let faced = clip.clone().with_base(base.clone()).expect("three each");
+        assert_eq!(faced.mesh.triangles, base.triangles);
+        assert_eq!(faced.mesh.positions, at(0.0));
+        assert!(faced.mesh.points.is_empty() && faced.mesh.normals.is_none());
+        assert_eq!(faced.mesh_at(1).positions, at(1.0));
+        faced.check().expect("a sound clip");
+        base.positions.push([0.0; 3]);
+        let fault = clip.with_base(base).expect_err("three and four");
+        assert_eq!(
+            fault.problem,
+            "the animation has 3 vertices, but its base mesh 4"
+        );
     }
 }

@@ -2,5 +2,6 @@
 
 pub mod clip;
 pub mod compress;
+pub mod motion;
 
 pub use clip::Clip;

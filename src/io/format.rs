@@ -13,6 +13,8 @@ pub enum Kind {
     Image,
     /// Atoms.
     Molecule,
+    /// A mesh, or a cloud, whose vertices move.
+    Animation,
     /// What commands report, or any other JSON documents.
     Report,
 }
@@ -25,6 +27,7 @@ impl Kind {
             Kind::Volume => "volume",
             Kind::Image => "image",
             Kind::Molecule => "molecule",
+            Kind::Animation => "animation",
             Kind::Report => "report",
         }
     }
@@ -36,6 +39,7 @@ impl Kind {
             Kind::Volume => "a volume",
             Kind::Image => "an image",
             Kind::Molecule => "a molecule",
+            Kind::Animation => "an animation",
             Kind::Report => "a report",
         }
     }
@@ -86,6 +90,10 @@ pub enum Format {
     Xyzr,
     /// Centres and radii, of words parted by commas.
     SpheresCsv,
+    /// POINTCACHE2, a cache of points.
+    Pc2,
+    /// MDD, a cache of points.
+    Mdd,
     /// JSON and JSON Lines.
     Json,
 }
@@ -282,6 +290,20 @@ const TABLE: &[Row] = &[
         )
     },
     row(
+        Format::Pc2,
+        &["pc2"],
+        Kind::Animation,
+        (true, true),
+        "POINTCACHE2: positions of points, frame by frame",
+    ),
+    row(
+        Format::Mdd,
+        &["mdd"],
+        Kind::Animation,
+        (true, true),
+        "MDD: positions of points, frame by frame, with the time of each",
+    ),
+    row(
         Format::Json,
         &["json", "jsonl"],
         Kind::Report,
@@ -427,14 +449,24 @@ pub fn sniff(bytes: &[u8], extension: Option<&str>) -> Result<Format, Fault> {
     if bytes.starts_with(super::vdb::MAGIC) {
         return Ok(Format::Vdb);
     }
+    if bytes.starts_with(super::pc2::MAGIC) {
+        return Ok(Format::Pc2);
+    }
     if super::nifti::is_header(bytes) {
         return Ok(Format::Nifti);
+    }
+    if by_name == Some(Format::Mdd) {
+        // Its length may by chance be that of a binary STL.
+        return Ok(Format::Mdd);
     }
     if by_name == Some(Format::Stl) || super::stl::is_binary(bytes) {
         return Ok(Format::Stl);
     }
     if let Some(format) = by_name {
         return Ok(format);
+    }
+    if super::mdd::is_exact(bytes) {
+        return Ok(Format::Mdd);
     }
     let text = bytes.trim_ascii_start();
     if text.starts_with(b"solid") {
@@ -499,6 +531,18 @@ mod tests {
             assert_eq!(sniff(bytes, extension), Ok(format), "{extension:?}");
         }
         assert!(sniff(b"12", None).is_err());
+    }
+
+    #[test]
+    fn caches_of_points_are_told_by_magic_or_by_size() {
+        let pc2 = b"POINTCACHE2\0\x01\0\0\0".as_slice();
+        assert_eq!(sniff(pc2, Some("bin")), Ok(Format::Pc2));
+        let mut mdd = vec![0; 8 + 4 + 12];
+        mdd[3] = 1;
+        mdd[7] = 1;
+        assert_eq!(sniff(&mdd, None), Ok(Format::Mdd));
+        assert_eq!(sniff(&mdd[..20], Some("mdd")), Ok(Format::Mdd));
+        assert!(sniff(&mdd[..20], None).is_err());
     }
 
     #[test]

@@ -13,6 +13,7 @@ pub mod gltf;
 mod header;
 mod hybrid36;
 pub mod json;
+pub mod mdd;
 pub mod metaimage;
 pub mod mmcif;
 pub mod nifti;
@@ -20,14 +21,17 @@ pub mod npy;
 pub mod nrrd;
 pub mod obj;
 pub mod off;
+pub mod pc2;
 pub mod pdb;
 #[cfg(test)]
 mod peers;
 pub mod ply;
 pub mod png;
+mod pointcache;
 pub mod pqr;
 pub mod refusal;
 mod samples;
+pub mod sequence;
 pub mod sink;
 pub mod source;
 pub mod stl;
@@ -43,6 +47,7 @@ mod roundtrip;
 #[cfg(test)]
 mod written_volume;
 
+use crate::anim::Clip;
 use crate::error::{Error, Fault, Result};
 use crate::image::samples::Image;
 use crate::mesh::{Mesh, Polygons};
@@ -69,6 +74,8 @@ pub enum Content {
     Image(Image),
     /// Atoms.
     Molecule(Molecule),
+    /// A mesh, or a cloud, whose vertices move.
+    Animation(Clip),
     /// JSON documents, in the order of the file.
     Report(Vec<Value>),
 }
@@ -81,6 +88,7 @@ impl Content {
             Content::Volume(_) => Kind::Volume,
             Content::Image(_) => Kind::Image,
             Content::Molecule(_) => Kind::Molecule,
+            Content::Animation(_) => Kind::Animation,
             Content::Report(_) => Kind::Report,
         }
     }
@@ -109,19 +117,25 @@ pub fn read(source: &Source, format: Option<Format>) -> Result<(Content, Input, 
         Content::Volume(volume) => volume.content(),
         Content::Image(image) => image.content(),
         Content::Molecule(molecule) => molecule.content(),
+        Content::Animation(clip) => clip.content(),
         Content::Report(documents) => report::Content {
             documents: Some(documents.len() as u64),
             ..report::Content::default()
         },
     };
-    let input = Input {
+    let input = input(source, format, digest, described);
+    Ok((content, input, warnings))
+}
+
+/// The line of an input for the report.
+fn input(source: &Source, format: Format, digest: String, content: report::Content) -> Input {
+    Input {
         path: source.name().to_owned(),
         format: format.name().to_owned(),
         bytes: source.stored_bytes(),
         sha256: digest,
-        content: described,
-    };
-    Ok((content, input, warnings))
+        content,
+    }
 }
 
 fn parse(source: &Source, format: Format, warnings: &mut Vec<Warning>) -> Result<Content, Refusal> {
@@ -144,6 +158,8 @@ fn parse(source: &Source, format: Format, warnings: &mut Vec<Warning>) -> Result
         Format::Pqr => Content::Molecule(pqr::read(source, warnings)?),
         Format::Xyzr => Content::Molecule(xyzr::read(source, warnings)?),
         Format::SpheresCsv => Content::Molecule(xyzr::read_csv(source, warnings)?),
+        Format::Pc2 => Content::Animation(pc2::read(source, warnings)?),
+        Format::Mdd => Content::Animation(mdd::read(source, warnings)?),
         Format::Json => Content::Report(json::read(source, warnings)?),
         Format::Vdb => return Err(Fault::whole("vdb files are written, not read").into()),
     };
@@ -152,6 +168,7 @@ fn parse(source: &Source, format: Format, warnings: &mut Vec<Warning>) -> Result
         Content::Volume(volume) => volume.check()?,
         Content::Image(image) => image.check()?,
         Content::Molecule(molecule) => molecule.check()?,
+        Content::Animation(clip) => clip.check()?,
         Content::Report(_) => {}
     }
     Ok(content)
@@ -229,6 +246,48 @@ pub fn read_molecule(
         (Content::Molecule(molecule), input, warnings) => Ok((molecule, input, warnings)),
         (other, input, _) => Err(wrong_kind(source, &input.format, &other, &[Kind::Molecule])),
     }
+}
+
+/// Reads an animation; a file of another kind is an error.
+pub fn read_animation(
+    source: &Source,
+    format: Option<Format>,
+) -> Result<(Clip, Input, Vec<Warning>)> {
+    match read(source, format)? {
+        (Content::Animation(clip), input, warnings) => Ok((clip, input, warnings)),
+        (other, input, _) => Err(wrong_kind(
+            source,
+            &input.format,
+            &other,
+            &[Kind::Animation],
+        )),
+    }
+}
+
+/// Reads an animation of a glTF file, sampled `fps` times a second; see [`gltf::read_clip`].
+///
+/// `animation` names one or is its number, the first is taken without it. Errs for a file of any other
+/// format too.
+pub fn read_gltf_clip(
+    source: &Source,
+    format: Option<Format>,
+    fps: f64,
+    animation: Option<&str>,
+) -> Result<(Clip, Input, Vec<Warning>)> {
+    let failed = |refusal: Refusal| refusal.of(source);
+    let format = match format {
+        Some(format) => format,
+        None => format::sniff(source.bytes(), source.extension()).map_err(|f| failed(f.into()))?,
+    };
+    if !matches!(format, Format::Gltf | Format::Glb) {
+        let problem = format!("is {}, but glTF is needed", format.name());
+        return Err(failed(Fault::whole(problem).into()));
+    }
+    let mut warnings = Vec::new();
+    let clip = gltf::read_clip(source, fps, animation, &mut warnings).map_err(failed)?;
+    clip.check().map_err(|fault| failed(fault.into()))?;
+    let input = input(source, format, source.sha256(), clip.content());
+    Ok((clip, input, warnings))
 }
 
 /// Reads JSON documents; a file of another kind is an error.
@@ -334,6 +393,72 @@ fn dropped_of_molecule(molecule: &Molecule, format: Format) -> Vec<Warning> {
             note("radii-of-elements", message.to_owned(), sized);
         }
         _ => {}
+    }
+    lost
+}
+
+/// Writes an animation in one file: a cache of points, or GLB. Returns the lines for the report and
+/// warnings about what the format cannot hold.
+pub fn write_animation(
+    clip: &Clip,
+    sink: &Sink,
+    format: Format,
+) -> Result<(Vec<Output>, Vec<Warning>)> {
+    let writer: fn(&Clip, &mut dyn Write) -> std::io::Result<()> = match format {
+        Format::Pc2 => pc2::write,
+        Format::Mdd => mdd::write,
+        Format::Glb => gltf::write_clip,
+        _ => return Err(cannot_hold(format, Kind::Animation)),
+    };
+    let output = sink.write(format, |out| writer(clip, out))?;
+    Ok((vec![output], dropped_of_clip(clip, format)))
+}
+
+/// What of an animation a format leaves out.
+fn dropped_of_clip(clip: &Clip, format: Format) -> Vec<Warning> {
+    let (name, mesh) = (format.name(), &clip.mesh);
+    let is_cache = format != Format::Glb;
+    let normals = mesh
+        .normals
+        .as_ref()
+        .filter(|_| is_cache || clip.frames() > 1);
+    let of_caches = |count: usize| if is_cache { count } else { 0 };
+    let parts = [
+        ("dropped-faces", "faces", of_caches(mesh.face_count())),
+        (
+            "dropped-segments",
+            "polylines",
+            of_caches(mesh.segments.len()),
+        ),
+        (
+            "dropped-normals",
+            "normals of moving vertices",
+            normals.map_or(0, Vec::len),
+        ),
+        (
+            "dropped-colours",
+            "vertex colours",
+            of_caches(mesh.colors.as_ref().map_or(0, Vec::len)),
+        ),
+        (
+            "split-polygons",
+            "faces of more than three corners",
+            mesh.polygons
+                .as_ref()
+                .filter(|_| !is_cache)
+                .map_or(0, Polygons::len),
+        ),
+    ];
+    let parts = parts.into_iter().filter(|(_, _, count)| *count > 0);
+    let mut lost: Vec<Warning> = parts
+        .map(|(code, what, count)| {
+            let message = format!("{name} files hold no {what}; left out");
+            Warning::new(code, message, count as u64, None)
+        })
+        .collect();
+    if is_cache && let (count @ 1.., first) = pointcache::rounded(clip) {
+        let message = format!("positions that {name} files, in single precision, round");
+        lost.push(Warning::new("rounded-coordinates", message, count, first));
     }
     lost
 }

@@ -9,29 +9,67 @@ use crate::mesh::Mesh;
 use crate::numeric::vector::normalize;
 use crate::report::Warning;
 
+/// Placed meshes in one.
+pub struct Assembled {
+    /// All of them, as stored.
+    pub mesh: Mesh,
+    /// Which vertices are whose, in their order.
+    pub parts: Vec<Part>,
+    counts: Counts,
+}
+
+/// Vertices of one set of accessors in one node.
+#[derive(Debug, Clone)]
+pub struct Part {
+    /// Index of the placed mesh.
+    pub placed: usize,
+    /// The primitives that use them, by their index in the mesh; at least one.
+    pub primitives: Vec<usize>,
+    /// The first of the vertices.
+    pub base: usize,
+    /// Their number.
+    pub count: usize,
+}
+
+impl Assembled {
+    /// Warns of what is left out of a mesh as stored.
+    pub fn warn(&self, warnings: &mut Vec<Warning>) {
+        self.counts.warn(warnings);
+    }
+
+    /// Warns of what is left out where joints and morph targets are not.
+    pub fn warn_posed(self, warnings: &mut Vec<Warning>) {
+        let counts = Counts {
+            skins: 0,
+            targets: 0,
+            ..self.counts
+        };
+        counts.warn(warnings);
+    }
+}
+
 /// Puts the primitives of all placed meshes into one mesh, in the order of the nodes.
-pub fn assemble(
-    reader: Reader,
-    placed: &[Placed],
-    limit: u64,
-    warnings: &mut Vec<Warning>,
-) -> Result<Mesh, Refusal> {
+pub fn assemble(reader: &mut Reader, placed: &[Placed], limit: u64) -> Result<Assembled, Refusal> {
     let mut work = Assembly {
         reader,
         limit,
         mesh: Mesh::default(),
         with_normals: true,
         with_colors: true,
+        parts: Vec::new(),
         counts: Counts::default(),
     };
     work.survey(placed)?;
     work.mesh.normals = work.with_normals.then(Vec::new);
     work.mesh.colors = work.with_colors.then(Vec::new);
-    for place in placed {
-        work.place(place)?;
+    for (index, place) in placed.iter().enumerate() {
+        work.place(index, place)?;
     }
-    work.counts.warn(warnings);
-    Ok(work.mesh)
+    Ok(Assembled {
+        mesh: work.mesh,
+        parts: work.parts,
+        counts: work.counts,
+    })
 }
 
 /// What is left out, counted.
@@ -93,19 +131,20 @@ impl Counts {
     }
 }
 
-struct Assembly<'a> {
-    reader: Reader<'a>,
+struct Assembly<'r, 'a> {
+    reader: &'r mut Reader<'a>,
     limit: u64,
     mesh: Mesh,
     with_normals: bool,
     with_colors: bool,
+    parts: Vec<Part>,
     counts: Counts,
 }
 
 /// The accessors that make the vertices of a primitive.
 type Attributes = (usize, Option<usize>, Option<usize>);
 
-impl<'a> Assembly<'a> {
+impl<'a> Assembly<'_, 'a> {
     fn primitives(&self, place: &Placed) -> Result<&'a [Primitive], Refusal> {
         let meshes = &self.reader.document.meshes;
         match meshes.get(place.mesh) {
@@ -142,9 +181,9 @@ impl<'a> Assembly<'a> {
     }
 
     /// Adds the primitives of one node.
-    fn place(&mut self, place: &Placed) -> Result<(), Refusal> {
-        // The vertices made for this node so far: the accessors, the first vertex and the number.
-        let mut made: Vec<(Attributes, usize, usize)> = Vec::new();
+    fn place(&mut self, place_index: usize, place: &Placed) -> Result<(), Refusal> {
+        // The vertices made for this node so far: the accessors and the part.
+        let mut made: Vec<(Attributes, usize)> = Vec::new();
         for (index, primitive) in self.primitives(place)?.iter().enumerate() {
             let Some(position) = primitive.attributes.get("POSITION").copied() else {
                 continue;
@@ -159,15 +198,24 @@ impl<'a> Assembly<'a> {
                 other(self.with_normals, "NORMAL"),
                 other(self.with_colors, "COLOR_0"),
             );
-            let (base, count) = match made.iter().find(|(key, ..)| *key == attributes) {
-                Some((_, base, count)) => (*base, *count),
+            let part = match made.iter().find(|(key, _)| *key == attributes) {
+                Some((_, part)) => *part,
                 None => {
                     let base = self.mesh.positions.len();
                     let count = self.add_vertices(place, attributes)?;
-                    made.push((attributes, base, count));
-                    (base, count)
+                    made.push((attributes, self.parts.len()));
+                    self.parts.push(Part {
+                        placed: place_index,
+                        primitives: Vec::new(),
+                        base,
+                        count,
+                    });
+                    self.parts.len() - 1
                 }
             };
+            let part = &mut self.parts[part];
+            part.primitives.push(index);
+            let (base, count) = (part.base, part.count);
             self.add_elements(place, index, primitive, base, count)?;
         }
         Ok(())

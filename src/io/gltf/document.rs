@@ -169,6 +169,8 @@ fn is_supported(extension: &str) -> bool {
 pub struct Opened<'a> {
     /// What the file says.
     pub document: Document,
+    /// The text that says it.
+    pub json: &'a [u8],
     /// The binary chunk, where there is one.
     pub chunk: Option<&'a [u8]>,
 }
@@ -215,7 +217,11 @@ pub fn open<'a>(bytes: &'a [u8], warnings: &mut Vec<Warning>) -> Result<Opened<'
         ))
         .with_hint("export it without compression or extensions"));
     }
-    Ok(Opened { document, chunk })
+    Ok(Opened {
+        document,
+        json,
+        chunk,
+    })
 }
 
 type Chunks<'a> = (&'a [u8], Option<&'a [u8]>);

@@ -57,18 +57,7 @@ impl Placed {
 /// A child that does not exist, has two parents, or is above itself is a fault.
 pub fn placed(document: &Document) -> Result<Vec<Placed>, Fault> {
     let nodes = &document.nodes;
-    let parents = parents(nodes)?;
-    let roots: Vec<usize> = match (document.scene, document.scenes.as_slice()) {
-        (None, []) => (0..nodes.len()).filter(|n| parents[*n].is_none()).collect(),
-        (scene, scenes) => {
-            let index = scene.unwrap_or(0);
-            let scene = scenes.get(index).ok_or_else(|| {
-                let problem = format!("is the default, but there are {}", scenes.len());
-                Fault::element("scene", index, problem)
-            })?;
-            scene.nodes.clone()
-        }
-    };
+    let roots = roots(document)?;
     let mut found = Vec::new();
     let mut seen = vec![false; nodes.len()];
     let mut stack: Vec<(usize, Matrix4<f64>)> = Vec::new();
@@ -100,6 +89,46 @@ pub fn placed(document: &Document) -> Result<Vec<Placed>, Fault> {
         stack.extend(node.children.iter().rev().map(|c| (*c, transform)));
     }
     Ok(found)
+}
+
+/// The nodes that the default scene shows with all below them. Errs as [`placed`] does.
+fn roots(document: &Document) -> Result<Vec<usize>, Fault> {
+    let nodes = &document.nodes;
+    let parents = parents(nodes)?;
+    match (document.scene, document.scenes.as_slice()) {
+        (None, []) => Ok((0..nodes.len()).filter(|n| parents[*n].is_none()).collect()),
+        (scene, scenes) => {
+            let index = scene.unwrap_or(0);
+            let scene = scenes.get(index).ok_or_else(|| {
+                let problem = format!("is the default, but there are {}", scenes.len());
+                Fault::element("scene", index, problem)
+            })?;
+            Ok(scene.nodes.clone())
+        }
+    }
+}
+
+/// All nodes, each after the one above it, with that one: those of the default scene first, whose
+/// roots have none, then the others.
+///
+/// Errs as [`placed`] does; what that takes is taken.
+pub fn order(document: &Document) -> Result<Vec<(usize, Option<usize>)>, Fault> {
+    let nodes = &document.nodes;
+    let parents = parents(nodes)?;
+    let others = (0..nodes.len()).filter(|n| parents[*n].is_none());
+    let mut seen = vec![false; nodes.len()];
+    let mut order = Vec::with_capacity(nodes.len());
+    for root in roots(document)?.into_iter().chain(others) {
+        let mut stack = vec![(root, None)];
+        while let Some((node, above)) = stack.pop() {
+            if std::mem::replace(&mut seen[node], true) {
+                continue;
+            }
+            order.push((node, above));
+            stack.extend(nodes[node].children.iter().map(|c| (*c, Some(node))));
+        }
+    }
+    Ok(order)
 }
 
 /// The parent of every node; each has one at most and none is above itself.
@@ -142,21 +171,48 @@ fn parents(nodes: &[Node]) -> Result<Vec<Option<usize>>, Fault> {
 
 /// The transform of a node: its matrix, or scale, then rotation, then translation.
 fn local(node: &Node) -> Matrix4<f64> {
-    if let Some(matrix) = node.matrix {
-        return Matrix4::from_column_slice(&matrix);
+    match node.matrix {
+        Some(matrix) => Matrix4::from_column_slice(&matrix),
+        None => Local::of(node).matrix(),
     }
-    let [x, y, z] = node.translation.unwrap_or([0.0; 3]);
-    let mut transform = Translation3::new(x, y, z).to_homogeneous();
-    if let Some([x, y, z, w]) = node.rotation {
-        // A file holds rotations in single precision, of unit length as far as that goes; one of
-        // zero length turns nothing.
-        let rotation = Quaternion::new(w, x, y, z);
-        if let Some(unit) = UnitQuaternion::try_new(rotation, 0.0) {
-            transform *= unit.to_homogeneous();
+}
+
+/// Where a node is in the one above it, in parts.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Local {
+    /// What it is moved by, at last.
+    pub translation: Option<[f64; 3]>,
+    /// What it is turned by: x, y, z, w of a quaternion of any length.
+    pub rotation: Option<[f64; 4]>,
+    /// What it is scaled by, at first.
+    pub scale: Option<[f64; 3]>,
+}
+
+impl Local {
+    /// The parts that the node states.
+    pub fn of(node: &Node) -> Local {
+        Local {
+            translation: node.translation,
+            rotation: node.rotation,
+            scale: node.scale,
         }
     }
-    if let Some([x, y, z]) = node.scale {
-        transform *= Matrix4::new_nonuniform_scaling(&nalgebra::Vector3::new(x, y, z));
+
+    /// All in one.
+    pub fn matrix(&self) -> Matrix4<f64> {
+        let [x, y, z] = self.translation.unwrap_or([0.0; 3]);
+        let mut transform = Translation3::new(x, y, z).to_homogeneous();
+        if let Some([x, y, z, w]) = self.rotation {
+            // A file holds rotations in single precision, of unit length as far as that goes; one of
+            // zero length turns nothing.
+            let rotation = Quaternion::new(w, x, y, z);
+            if let Some(unit) = UnitQuaternion::try_new(rotation, 0.0) {
+                transform *= unit.to_homogeneous();
+            }
+        }
+        if let Some([x, y, z]) = self.scale {
+            transform *= Matrix4::new_nonuniform_scaling(&nalgebra::Vector3::new(x, y, z));
+        }
+        transform
     }
-    transform
 }

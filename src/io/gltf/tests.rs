@@ -12,7 +12,7 @@ fn parse(bytes: &[u8]) -> Result<(Mesh, Vec<Warning>), Fault> {
 }
 
 /// A GLB of a document (its asset is added) and a binary chunk.
-fn glb(json: &str, binary: &[u8]) -> Vec<u8> {
+pub fn glb(json: &str, binary: &[u8]) -> Vec<u8> {
     let mut json = format!("{{\"asset\":{{\"version\":\"2.0\"}},{json}}}").into_bytes();
     json.resize(json.len().next_multiple_of(4), b' ');
     let mut binary = binary.to_vec();
@@ -30,7 +30,7 @@ fn glb(json: &str, binary: &[u8]) -> Vec<u8> {
     bytes
 }
 
-fn floats(values: &[f32]) -> Vec<u8> {
+pub fn floats(values: &[f32]) -> Vec<u8> {
     values.iter().flat_map(|v| v.to_le_bytes()).collect()
 }
 

@@ -2,6 +2,8 @@
 
 use crate::mesh::Mesh;
 use crate::numeric::vector::{Vec3, sub};
+use crate::spatial::aabb::Aabb;
+use rayon::prelude::*;
 use serde_json::{Value, json};
 use std::io::{self, Write};
 
@@ -20,11 +22,22 @@ const CHUNK: usize = 1 << 14;
 /// three corners are written as the triangles they were split into. A mesh without a triangle,
 /// line or point is an empty scene, whatever vertices it has: glTF has no primitive for them.
 pub fn write(mesh: &Mesh, out: &mut dyn Write) -> io::Result<()> {
-    let centre = local_origin(mesh);
+    let centre = local_origin(&mesh.positions, mesh.bounds());
     let parts = Parts::of(mesh, centre)?;
-    let mut json = serde_json::to_vec(&parts.document(centre))?;
+    container(&parts.document(centre), parts.length, out, |out| {
+        write_binary(mesh, centre, out)
+    })
+}
+
+/// Writes a GLB file of a document and so many bytes of binary data, a multiple of 4.
+pub fn container(
+    document: &Value,
+    binary: u128,
+    out: &mut dyn Write,
+    write_binary: impl FnOnce(&mut dyn Write) -> io::Result<()>,
+) -> io::Result<()> {
+    let mut json = serde_json::to_vec(document)?;
     json.resize(json.len().next_multiple_of(4), b' ');
-    let binary = parts.length;
     let chunk = if binary > 0 { 8 + binary } else { 0 };
     let total = 12 + 8 + json.len() as u128 + chunk;
     let total = u32::try_from(total).map_err(|_| {
@@ -41,20 +54,20 @@ pub fn write(mesh: &Mesh, out: &mut dyn Write) -> io::Result<()> {
     if binary > 0 {
         out.write_all(&(binary as u32).to_le_bytes())?;
         out.write_all(b"BIN\0")?;
-        write_binary(mesh, centre, out)?;
+        write_binary(out)?;
     }
     Ok(())
 }
 
-fn invalid(problem: String) -> io::Error {
+/// An error of what the format cannot hold.
+pub fn invalid(problem: String) -> io::Error {
     io::Error::new(io::ErrorKind::InvalidData, problem)
 }
 
 /// What is subtracted from the vertices and added by the node; zero where that gains nothing.
-fn local_origin(mesh: &Mesh) -> Vec3 {
+pub fn local_origin(positions: &[Vec3], bounds: Aabb) -> Vec3 {
     let exact = |p: &Vec3| p.iter().all(|c| f64::from(*c as f32) == *c);
-    let bounds = mesh.bounds();
-    if bounds.is_empty() || mesh.positions.iter().all(exact) {
+    if bounds.is_empty() || positions.par_iter().all(exact) {
         return [0.0; 3];
     }
     let (centre, extent) = (bounds.centre(), bounds.extent());
@@ -65,15 +78,17 @@ fn local_origin(mesh: &Mesh) -> Vec3 {
     }
 }
 
-fn single(p: Vec3, centre: Vec3) -> [f32; 3] {
+/// A position as it is written.
+pub fn single(p: Vec3, centre: Vec3) -> [f32; 3] {
     sub(p, centre).map(|c| c as f32)
 }
 
 /// How the binary chunk is laid out; all parts are multiples of 4 bytes long.
-struct Parts {
+pub struct Parts {
     /// The number of elements of each part that is there, in the order of the file.
     sections: Vec<Section>,
-    length: u128,
+    /// Bytes of all.
+    pub length: u128,
     min: [f32; 3],
     max: [f32; 3],
 }
@@ -85,7 +100,8 @@ struct Section {
 }
 
 impl Parts {
-    fn of(mesh: &Mesh, centre: Vec3) -> io::Result<Parts> {
+    /// The parts of a mesh that is moved by `centre` to the origin.
+    pub fn of(mesh: &Mesh, centre: Vec3) -> io::Result<Parts> {
         let vertices = mesh.positions.len();
         let lists = [
             ("POSITION", vertices, 12),
@@ -128,7 +144,7 @@ impl Parts {
     }
 
     /// The JSON chunk.
-    fn document(&self, centre: Vec3) -> Value {
+    pub fn document(&self, centre: Vec3) -> Value {
         let asset = json!({ "version": "2.0", "generator": "scantle" });
         if self.sections.is_empty() {
             return json!({ "asset": asset, "scene": 0, "scenes": [{}] });
@@ -189,7 +205,7 @@ impl Parts {
 }
 
 /// The binary chunk: the sections in their order.
-fn write_binary(mesh: &Mesh, centre: Vec3, out: &mut dyn Write) -> io::Result<()> {
+pub fn write_binary(mesh: &Mesh, centre: Vec3, out: &mut dyn Write) -> io::Result<()> {
     let mut bytes = Vec::with_capacity(CHUNK * 16);
     let floats = |bytes: &mut Vec<u8>, values: &[f32]| {
         bytes.extend(values.iter().flat_map(|v| v.to_le_bytes()));
