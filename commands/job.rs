@@ -6,6 +6,7 @@ use crate::exit::Exit;
 use crate::machine::{Moment, peak_bytes};
 use crate::progress::Recorder;
 use crate::streams::{complain, say};
+use crate::taken::Taken;
 use crate::words;
 use scantle::error::{Error, Result, number};
 use scantle::image::samples::Image;
@@ -23,9 +24,7 @@ use scantle::volume::Volume;
 use serde::Serialize;
 use serde_json::Value;
 use std::path::Path;
-
-/// What stands for the label in the place of a result.
-const LABEL: &str = "{label}";
+use std::sync::Mutex;
 
 /// What a command found: the part of the report that is its own.
 pub struct Found<P, R> {
@@ -126,6 +125,7 @@ pub struct Job<'a> {
     written: Vec<Output>,
     warnings: Vec<Warning>,
     opened: usize,
+    taken: Option<&'a Mutex<Taken>>,
 }
 
 impl<'a> Job<'a> {
@@ -148,12 +148,20 @@ impl<'a> Job<'a> {
             written: Vec::new(),
             warnings: Vec::new(),
             opened: 0,
+            taken: None,
         }
     }
 
-    pub(crate) fn send_to(&mut self, output: Option<Target>, extras: Vec<Beside>) {
+    /// Where it writes; `taken` are the places of all jobs.
+    pub(crate) fn send_to(
+        &mut self,
+        output: Option<Target>,
+        extras: Vec<Beside>,
+        taken: &'a Mutex<Taken>,
+    ) {
         self.output = output;
         self.extras = extras;
+        self.taken = Some(taken);
     }
 
     /// Who hears how far the work is.
@@ -253,17 +261,28 @@ impl<'a> Job<'a> {
 
     /// Whether the result is a file for each label.
     pub fn takes_labels(&self) -> bool {
-        let path = self.output.as_ref().map(|target| target.place.sink.path());
-        path.is_some_and(|path| path.display().to_string().contains(LABEL))
+        self.output.as_ref().is_some_and(Target::takes_labels)
     }
 
-    /// Writes the result of one label, where there is a file for each.
-    pub fn write_labelled(&mut self, label: &str, mesh: &Mesh) -> Result<()> {
-        let all = self.output.clone();
-        if let Some(target) = &mut self.output {
-            let path = target.place.sink.path().display().to_string();
-            target.place.sink = Sink::new(&path.replace(LABEL, label));
+    /// Refuses, before any work, labels whose file would go over what is read, or where something else goes.
+    pub fn expect_labels(&self, labels: impl Iterator<Item = String>) -> Result<()> {
+        let (Some(target), Some(taken)) = (&self.output, self.taken) else {
+            return Ok(());
+        };
+        if !target.takes_labels() {
+            return Ok(());
         }
+        let mut taken = taken.lock().expect("no one panics with it");
+        for label in labels {
+            taken.take(&target.of_label(&label).writes())?;
+        }
+        Ok(())
+    }
+
+    /// Writes the result of one label, where there is a file for each; see [`Job::expect_labels`].
+    pub fn write_labelled(&mut self, label: &str, mesh: &Mesh) -> Result<()> {
+        let own = self.output.as_ref().map(|all| all.of_label(label));
+        let all = std::mem::replace(&mut self.output, own);
         let written = self.write_mesh(mesh);
         self.output = all;
         written

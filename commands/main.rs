@@ -15,6 +15,7 @@ mod runs;
 mod shared;
 mod streams;
 mod table;
+mod taken;
 mod trade;
 mod words;
 mod wrapped;

@@ -14,11 +14,13 @@ use crate::context::{Context, Files};
 use crate::exit::Exit;
 use crate::job::{Found, Job};
 use crate::shared::{Common, Inputs, MaxError, Output, Verify, named, not_negative, positive};
+use crate::streams::complain;
 use clap::{ArgGroup, value_parser};
 use frames::Frames;
 use output::Extras;
 use result::{Solved, Stats, Verified};
 use scantle::error::{At, Error, Result};
+use scantle::io::sink::Sink;
 use scantle::io::source::Source;
 use scantle::measure::passage::passage;
 use scantle::protein::Molecule;
@@ -279,6 +281,16 @@ pub fn run(args: &Args) -> Result<Exit> {
     let context = Context::new(&args.common)?;
     let params = args.params(context.memory());
     params.check()?;
+    let frames = args
+        .clusters
+        .as_deref()
+        .map(|word| Frames::new(Sink::new(word), args.cluster_threshold));
+    let files = args
+        .extras
+        .of(Files::each(&args.inputs).output(&args.output))
+        .reads("radii", &args.radii)
+        .once("clusters", frames.as_ref().map(Frames::sink));
+    files.check_reads()?;
     let radii = match &args.radii {
         None => Radii::default(),
         Some(word) => {
@@ -290,19 +302,11 @@ pub fn run(args: &Args) -> Result<Exit> {
             })?
         }
     };
-    let files = args
-        .extras
-        .of(Files::each(&args.inputs).output(&args.output));
-    let frames = args
-        .clusters
-        .as_deref()
-        .map(|word| Frames::new(word, args.cluster_threshold, &args.inputs, context.memory()))
-        .transpose()?;
     let exit = context.run("tunnels", &files, |job| {
         tunnels(job, &params, args, &radii, frames.as_ref())
     })?;
-    frames.map_or(Ok(()), Frames::write)?;
-    Ok(exit)
+    let written = frames.map_or(Ok(()), Frames::write);
+    Ok(exit.max(written.map_or_else(|error| complain(&error, None), |()| Exit::Done)))
 }
 
 /// One model's atoms that count, and what was found between them.
