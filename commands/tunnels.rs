@@ -29,8 +29,8 @@ use scantle::protein::select::{SelectParams, Selected, SelectionCounts};
 use scantle::protein::start::Start;
 use scantle::protein::tunnels::pores::pores;
 use scantle::protein::tunnels::{
-    Exit as WayOut, Extent, Method, Params, Prefer, Removal, Searched, Start as Place, TRADE,
-    Tunnel, Widest, find,
+    Exit as WayOut, Extent, Method, Origin, Params, Prefer, Removal, Searched, TRADE, Tunnel,
+    Widest, find,
 };
 use scantle::report::{Accuracy, Measures, Modelled};
 use schemars::JsonSchema;
@@ -314,7 +314,7 @@ pub(crate) struct Model {
     number: i32,
     selected: Selected,
     /// Where ways start; none for pores.
-    start: Option<Place>,
+    start: Option<Origin>,
     widest: Option<Widest>,
     tunnels: Vec<Tunnel>,
     merged: u64,

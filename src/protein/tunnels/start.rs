@@ -9,7 +9,7 @@ use crate::numeric::vector::{length, sub};
 
 /// Where ways start.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Start {
+pub struct Origin {
     /// As asked for.
     pub given: [f64; 3],
     /// The point used.
@@ -27,10 +27,10 @@ pub fn outside(point: [f64; 3]) -> Error {
     Error::Geometry(Fault::whole(problem).with_hint(hint))
 }
 
-impl Start {
+impl Origin {
     /// A start in no triangulation.
     pub fn alone(given: [f64; 3], clearance: f64) -> Self {
-        Start {
+        Origin {
             given,
             used: given,
             clearance,
@@ -46,7 +46,7 @@ impl Start {
         params: &Params,
         outside_cells: &mut Outside,
     ) -> Result<Self, Halt> {
-        let mut start = Start::alone(given, graph.width_at(given));
+        let mut start = Origin::alone(given, graph.width_at(given));
         if params.start_search > 0.0 {
             let mut best: Option<(f64, f64, u32)> = None;
             for cell in 0..graph.triangulation.cells().len() as u32 {
