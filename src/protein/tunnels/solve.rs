@@ -258,6 +258,10 @@ impl<'a> Search<'a> {
         };
         let most = 50 * self.params.count + 50;
         for round in 0..most {
+            // One more search may only find that more atoms are needed for it.
+            if made.tunnels.len() >= self.params.count {
+                break;
+            }
             // The first is told however narrow it is.
             let least = if round == 0 {
                 f64::NEG_INFINITY
@@ -268,9 +272,6 @@ impl<'a> Search<'a> {
             let Some(route) = found.route else {
                 break;
             };
-            if made.tunnels.len() >= self.params.count {
-                break;
-            }
             // Of all ways that are as wide, the cheapest.
             let prefer = self.params.prefer;
             let width_there = route.width;
