@@ -3,12 +3,13 @@
 use crate::context::Context;
 use crate::destination::{Beside, Extra, Target};
 use crate::exit::Exit;
+pub use crate::found::Found;
 use crate::machine::{Moment, peak_bytes};
 use crate::progress::Recorder;
 use crate::streams::{complain, say};
 use crate::taken::Taken;
 use crate::words;
-use scantle::error::{Error, Result, number};
+use scantle::error::{Error, Result};
 use scantle::image::samples::Image;
 use scantle::io::format::{Format, Kind};
 use scantle::io::sink::Sink;
@@ -17,100 +18,12 @@ use scantle::io::{self, Content};
 use scantle::mesh::Mesh;
 use scantle::progress::Progress;
 use scantle::protein::Molecule;
-use scantle::report::{
-    Accuracy, Input, Measures, Modelled, Output, Report, Run, SCHEMA, Stage, Warning,
-};
+use scantle::report::{Input, Output, Report, Run, SCHEMA, Stage, Warning};
 use scantle::volume::Volume;
 use serde::Serialize;
 use serde_json::Value;
 use std::path::Path;
 use std::sync::Mutex;
-
-/// What a command found: the part of the report that is its own.
-pub struct Found<P, R> {
-    parameters: P,
-    result: R,
-    summary: String,
-    accuracy: Option<Measures>,
-    modelled: Option<Modelled>,
-    check: Option<(&'static str, f64)>,
-    beyond: Option<String>,
-}
-
-impl<P, R> Found<P, R> {
-    /// Parameters and result for the report, and a few words for a person.
-    pub fn new(parameters: P, result: R, summary: impl Into<String>) -> Self {
-        Found {
-            parameters,
-            result,
-            summary: summary.into(),
-            accuracy: None,
-            modelled: None,
-            check: None,
-            beyond: None,
-        }
-    }
-
-    /// With the error that was made.
-    pub fn accuracy(mut self, accuracy: Measures) -> Self {
-        self.accuracy = Some(accuracy);
-        self
-    }
-
-    /// With how much of the full model was built.
-    pub fn modelled(mut self, modelled: Modelled) -> Self {
-        self.modelled = Some(modelled);
-        self
-    }
-
-    /// With the check that the error is no larger than what `--OPTION` says, if it says anything.
-    pub fn check(mut self, option: &'static str, most: Option<f64>) -> Self {
-        self.check = most.map(|most| (option, most));
-        self
-    }
-
-    /// With what no measure tells, if there is anything: the check fails for it, whatever it allows.
-    pub fn beyond_measure(mut self, what: Option<String>) -> Self {
-        self.beyond = what;
-        self
-    }
-
-    /// Why the check fails, if it was asked for and does. It is about the first measure.
-    fn failure(&self) -> Option<String> {
-        let (option, most) = self.check?;
-        if let Some(what) = &self.beyond {
-            return Some(format!("{what}, which no --{option} allows"));
-        }
-        let first = match &self.accuracy {
-            Some(Measures::One(accuracy)) => Some(accuracy),
-            Some(Measures::Many(all)) => all.first(),
-            None => None,
-        };
-        let Some(Accuracy {
-            measure,
-            unit,
-            bound,
-            reached,
-            ..
-        }) = first
-        else {
-            return Some(format!("no error is known to compare with --{option}"));
-        };
-        let (verb, error) = match (reached, bound) {
-            (Some(reached), _) => ("is", *reached),
-            (None, Some(bound)) => ("may be up to", *bound),
-            (None, None) => {
-                return Some(format!(
-                    "{measure} is neither measured nor bounded; --verify measures it"
-                ));
-            }
-        };
-        // Written so that an error which is no number fails too.
-        let holds = error <= most;
-        let [error, most] = [error, most].map(number);
-        (!holds).then(|| format!("{measure} {verb} {error} {unit}, larger than --{option} {most}"))
-    }
-}
 
 /// One job: reads, writes, and keeps what the report will say about that.
 pub struct Job<'a> {
@@ -119,7 +32,8 @@ pub struct Job<'a> {
     format: Option<Format>,
     output: Option<Target>,
     extras: Vec<Beside>,
-    unwritten: Vec<Error>,
+    /// What went wrong without ending the job.
+    aside: Vec<Error>,
     recorder: Recorder,
     read: Vec<Input>,
     written: Vec<Output>,
@@ -142,7 +56,7 @@ impl<'a> Job<'a> {
             format,
             output: None,
             extras: Vec::new(),
-            unwritten: Vec::new(),
+            aside: Vec::new(),
             recorder: Recorder::new(start, with_bar),
             read: Vec::new(),
             written: Vec::new(),
@@ -368,8 +282,14 @@ impl<'a> Job<'a> {
         });
         match made {
             Ok(output) => self.written.push(output),
-            Err(error) => self.unwritten.push(error),
+            Err(error) => self.set_aside(error),
         }
+    }
+
+    /// Keeps what went wrong with a part of the work until the end of the job, which goes on: it is said
+    /// then, and the exit code tells it.
+    pub fn set_aside(&mut self, error: Error) {
+        self.aside.push(error);
     }
 
     /// Ends the job: says what is for people, and returns the report's bytes and the exit code.
@@ -386,9 +306,7 @@ impl<'a> Job<'a> {
             say(format_args!("{}: check failed: {why}", self.words[0]));
         }
         let mut exit = failure.map_or(Exit::Done, |_| Exit::CheckFailed);
-        for error in std::mem::take(&mut self.unwritten) {
-            exit = exit.max(self.complain(error));
-        }
+        exit = exit.max(self.complain_aside());
         let run = self.context.common().timings.then(|| Run {
             wall_s: stages.iter().map(|stage| stage.wall_s).sum(),
             cpu_s: stages.iter().map(|stage| stage.cpu_s).sum(),
@@ -416,7 +334,15 @@ impl<'a> Job<'a> {
     /// Ends the job that failed: says why, with the file that it is about.
     pub(crate) fn fail(mut self, error: Error) -> Exit {
         self.recorder.finish();
-        self.complain(error)
+        let aside = self.complain_aside();
+        aside.max(self.complain(error))
+    }
+
+    /// Says all that was set aside.
+    fn complain_aside(&mut self) -> Exit {
+        let aside = std::mem::take(&mut self.aside).into_iter();
+        let exits = aside.map(|error| self.complain(error));
+        exits.max().unwrap_or(Exit::Done)
     }
 
     /// Says what went wrong, with the file that it is about.
@@ -457,54 +383,5 @@ impl<'a> Job<'a> {
                 ));
             }
         }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn found(reached: Option<f64>, bound: Option<f64>, most: Option<f64>) -> Found<(), ()> {
-        let accuracy = Accuracy {
-            measure: "distance".into(),
-            unit: "voxel".into(),
-            bound,
-            reached,
-            reference: "sphere".into(),
-            verified: reached.is_some(),
-        };
-        Found::new((), (), "")
-            .accuracy(Measures::One(accuracy))
-            .check("max-error", most)
-    }
-
-    #[test]
-    fn the_error_reached_is_checked_and_else_its_bound() {
-        assert_eq!(found(Some(2.0), None, None).failure(), None);
-        assert_eq!(found(Some(0.5), Some(0.9), Some(0.5)).failure(), None);
-        assert_eq!(
-            found(Some(0.6), Some(0.9), Some(0.5)).failure().as_deref(),
-            Some("distance is 0.6 voxel, larger than --max-error 0.5")
-        );
-        assert_eq!(
-            found(None, Some(0.9), Some(0.5)).failure().as_deref(),
-            Some("distance may be up to 0.9 voxel, larger than --max-error 0.5")
-        );
-        assert!(found(Some(f64::NAN), None, Some(0.5)).failure().is_some());
-        assert!(found(None, None, Some(0.5)).failure().is_some());
-        let nothing: Found<(), ()> = Found::new((), (), "").check("max-error", Some(1.0));
-        assert!(nothing.failure().is_some());
-    }
-
-    #[test]
-    fn what_no_measure_tells_fails_only_a_check() {
-        let beyond = |most| found(Some(0.0), None, most).beyond_measure(Some("x is gone".into()));
-        assert_eq!(beyond(None).failure(), None);
-        assert_eq!(
-            beyond(Some(9.0)).failure().as_deref(),
-            Some("x is gone, which no --max-error allows")
-        );
-        let nothing = found(Some(0.0), None, Some(0.0)).beyond_measure(None);
-        assert_eq!(nothing.failure(), None);
     }
 }

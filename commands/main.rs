@@ -7,6 +7,7 @@ mod cli;
 mod context;
 mod destination;
 mod exit;
+mod found;
 mod job;
 mod machine;
 mod places;

@@ -1,6 +1,6 @@
 //! The same tunnels in many frames: clusters, and how wide each is over time.
 
-use super::Model;
+use super::solve::Model;
 use scantle::error::Result;
 use scantle::io::sink::Sink;
 use scantle::protein::tunnels::cluster::{Course, clusters};

@@ -1,0 +1,133 @@
+//! What `scantle tunnels` finds, and says of what it cannot.
+
+use crate::support::Workplace;
+use crate::tunnel_outputs::crystal;
+use serde_json::Value;
+use std::fmt::Write;
+use std::fs;
+
+const MIDDLE: &str = "--start 10.5,10.5,10.5";
+
+/// Models, each the lines of a file.
+fn models(all: &[&str]) -> String {
+    let mut text = String::new();
+    for (lines, number) in all.iter().zip(1..) {
+        let lines = lines.trim_end_matches("END\n");
+        writeln!(text, "MODEL {number:>8}\n{lines}ENDMDL").expect("text");
+    }
+    text + "END\n"
+}
+
+/// The first lines of a text.
+fn first_lines(text: &str, count: usize) -> String {
+    text.split_inclusive('\n').take(count).collect()
+}
+
+fn list(value: &Value) -> &[Value] {
+    value
+        .as_array()
+        .unwrap_or_else(|| panic!("{value} is no list"))
+}
+
+#[test]
+fn a_model_that_fails_does_not_keep_the_others_from_their_tunnels() {
+    let place = Workplace::new();
+    let whole = crystal();
+    // Atoms of two walls do not enclose the start, and of all but the last 20 the last is not there.
+    let few = first_lines(&whole, 40);
+    let cut = first_lines(&whole, 188);
+    place.put("few.pdb", models(&[&whole, &few, &whole]));
+    place.put("cut.pdb", models(&[&cut, &whole, &whole]));
+    place.put("none.pdb", models(&[&few, &few]));
+    for (file, start, fails, why) in [
+        ("few.pdb", MIDDLE, 1, "lies outside of the molecule"),
+        ("cut.pdb", "--start-atoms 0,215", 0, "215"),
+    ] {
+        let line = format!(
+            "tunnels {file} {start} --models all --count 2 -o {{stem}}.xyzr --clusters c.json"
+        );
+        let ran = place.run(&line);
+        assert_eq!(ran.code, 3, "{file}: {}", ran.stderr);
+        let number = fails + 1;
+        let said = ran.stderr.lines().filter(|line| line.contains(why));
+        let said: Vec<&str> = said.collect();
+        assert_eq!(said.len(), 1, "{file}: {}", ran.stderr);
+        assert!(
+            said[0].starts_with(&format!("scantle: {file}: ")),
+            "{said:?}"
+        );
+        assert!(
+            said[0].contains(&format!("in model {number}, ")),
+            "{said:?}"
+        );
+        let report = ran.document();
+        let result = &report["result"];
+        let failed = list(&result["failed_models"]);
+        assert_eq!(failed.len(), 1, "{file}");
+        assert_eq!(
+            (&failed[0]["index"], &failed[0]["model"]),
+            (&fails.into(), &number.into())
+        );
+        assert!(
+            failed[0]["message"]
+                .as_str()
+                .is_some_and(|m| m.contains(why)),
+            "{failed:?}"
+        );
+        let others = list(&result["other_models"]);
+        let found: Vec<&Value> = [result].into_iter().chain(others).collect();
+        let numbers: Vec<u64> = found.iter().filter_map(|m| m["model"].as_u64()).collect();
+        let expected: Vec<u64> = (1..=3).filter(|n| *n != number).collect();
+        assert_eq!(numbers, expected, "{file}");
+        for model in found {
+            assert_eq!(list(&model["tunnels"]).len(), 2, "{file}");
+        }
+        let stem = file.trim_end_matches(".pdb");
+        assert!(place.path(&format!("{stem}.xyzr")).exists());
+        let clusters = fs::read_to_string(place.path("c.json")).expect("clusters");
+        let clusters: Value = serde_json::from_str(&clusters).expect("JSON");
+        let frames = list(&clusters["frames"])
+            .iter()
+            .filter_map(|f| f["model"].as_u64());
+        assert_eq!(frames.collect::<Vec<_>>(), expected);
+    }
+    // Where all fail there is nothing to report, and every one is told.
+    fs::remove_file(place.path("c.json")).expect("it was there");
+    let before = place.names();
+    let line = format!("tunnels none.pdb {MIDDLE} --models all -o x.xyzr --clusters c.json");
+    let ran = place.run(&line);
+    assert_eq!(
+        (ran.code, ran.stdout.as_slice()),
+        (3, &b""[..]),
+        "{}",
+        ran.stderr
+    );
+    for number in [1, 2] {
+        assert!(
+            ran.stderr.contains(&format!("in model {number}, ")),
+            "{}",
+            ran.stderr
+        );
+    }
+    assert_eq!(place.names(), before);
+    // What is in no model is a wrong command line.
+    let ran = place.run("tunnels none.pdb --start-atoms 7,999 --models all");
+    assert_eq!(
+        (ran.code, ran.stdout.as_slice()),
+        (2, &b""[..]),
+        "{}",
+        ran.stderr
+    );
+    // One alone is as ever.
+    let ran = place.run(&format!("tunnels few.pdb {MIDDLE} --models 2"));
+    assert_eq!(
+        (ran.code, ran.stdout.as_slice()),
+        (3, &b""[..]),
+        "{}",
+        ran.stderr
+    );
+    assert!(!ran.stderr.contains("in model"), "{}", ran.stderr);
+    let ran = place.run(&format!("tunnels few.pdb {MIDDLE} --models 3 -q"));
+    assert_eq!(ran.code, 0, "{}", ran.stderr);
+    assert!(ran.document()["result"].get("failed_models").is_none());
+}
