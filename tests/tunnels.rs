@@ -23,6 +23,12 @@ fn first_lines(text: &str, count: usize) -> String {
     text.split_inclusive('\n').take(count).collect()
 }
 
+fn number(value: &Value) -> f64 {
+    value
+        .as_f64()
+        .unwrap_or_else(|| panic!("{value} is no number"))
+}
+
 fn list(value: &Value) -> &[Value] {
     value
         .as_array()
@@ -130,4 +136,57 @@ fn a_model_that_fails_does_not_keep_the_others_from_their_tunnels() {
     let ran = place.run(&format!("tunnels few.pdb {MIDDLE} --models 3 -q"));
     assert_eq!(ran.code, 0, "{}", ran.stderr);
     assert!(ran.document()["result"].get("failed_models").is_none());
+}
+
+/// Balls at random around a hole, as lines of a file.
+fn packing(seed: u64) -> String {
+    let mut state = seed;
+    let mut draw = || {
+        state = state
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1_442_695_040_888_963_407);
+        (state >> 33) as f64 / f64::from(1u32 << 31)
+    };
+    let mut balls: Vec<([f64; 3], f64)> = Vec::new();
+    let length = |p: [f64; 3]| p.iter().map(|c| c * c).sum::<f64>().sqrt();
+    while balls.len() < 150 {
+        let centre = [0; 3].map(|_| 18.0 * draw() - 9.0);
+        let radius = 1.2 + 0.6 * draw();
+        let away = length(centre);
+        let apart = |(other, _): &([f64; 3], f64)| {
+            length([0, 1, 2].map(|axis| other[axis] - centre[axis])) > 1.6
+        };
+        if away < 9.0 && away > 1.5 + radius && balls.iter().all(apart) {
+            balls.push((centre, radius));
+        }
+    }
+    let mut text = String::new();
+    for ([x, y, z], radius) in balls {
+        writeln!(text, "{x:.6} {y:.6} {z:.6} {radius:.6}").expect("text");
+    }
+    text
+}
+
+#[test]
+fn a_start_near_the_surface_is_verified() {
+    let place = Workplace::new();
+    // There the widest place near lies in a cell that the solvent holds, though its own does not.
+    for (seed, start) in [
+        (2, "-4.877,-4.706,-1.903"),
+        (4, "4.858,-5.907,-0.500"),
+        (7, "-5.988,2.042,-3.663"),
+        (22, "-3.893,-1.559,-5.381"),
+    ] {
+        place.put("a.xyzr", packing(seed));
+        let line = format!("tunnels a.xyzr --start={start} --method exact --verify -q");
+        let ran = place.run(&line);
+        assert_eq!(ran.code, 0, "{seed}: {}", ran.stderr);
+        let report = ran.document();
+        assert_eq!(report["accuracy"]["verified"], true, "{seed}");
+        assert!(number(&report["accuracy"]["reached"]) <= 1e-6, "{seed}");
+        let [widest, verified] = ["widest", "verified"].map(|key| &report["result"][key]);
+        let [low, high] = [0, 1].map(|k| number(&verified["exact"][k]));
+        assert!(low <= number(&widest["upper"]) + 1e-9, "{seed}: {widest}");
+        assert!(number(&widest["lower"]) <= high + 1e-9, "{seed}: {widest}");
+    }
 }

@@ -9,7 +9,9 @@ use scantle::protein::Molecule;
 use scantle::protein::radii::Radii;
 use scantle::protein::select::{SelectParams, Selected};
 use scantle::protein::tunnels::pores::pores;
-use scantle::protein::tunnels::{Method, Origin, Params, Searched, TRADE, Tunnel, Widest, find};
+use scantle::protein::tunnels::{
+    Exit, Method, Origin, Params, Searched, TRADE, Tunnel, Widest, find,
+};
 use scantle::report::{Accuracy, Measures};
 
 /// One model's atoms that count, and what was found between them.
@@ -112,6 +114,10 @@ const OCTREE: f64 = 0.005;
 
 /// Finds the exact width of the widest way, and asks an octree, which shares nothing with that, whether it is
 /// right.
+///
+/// Both go on to infinity. From the solvent that is no narrower: its probe came from there. And the place
+/// where ways start, which is held here, may lie in a cell that the solvent holds, though the cell whose dual
+/// vertex it is does not.
 pub fn verify(job: &Job, model: &Model, params: &Params) -> Result<Option<Verified>> {
     let (Some(start), Some(_)) = (&model.start, &model.widest) else {
         return Ok(None);
@@ -119,6 +125,7 @@ pub fn verify(job: &Job, model: &Model, params: &Params) -> Result<Option<Verifi
     job.progress().stage("verify", 0);
     let exact = Params {
         method: Method::Exact,
+        exit: Exit::Hull,
         start_search: 0.0,
         count: 1,
         ..*params
