@@ -190,3 +190,149 @@ fn a_start_near_the_surface_is_verified() {
         assert!(number(&widest["lower"]) <= high + 1e-9, "{seed}: {widest}");
     }
 }
+
+#[test]
+fn a_way_that_its_start_limits_is_told() {
+    let place = Workplace::new();
+    place.put("a.pdb", crystal());
+    let limited = |start: &str| {
+        let ran = place.run(&format!("tunnels a.pdb {start} --probe-radius 0 -q"));
+        assert_eq!(ran.code, 0, "{}", ran.stderr);
+        let report = ran.document();
+        let [start, widest] = ["start", "widest"].map(|key| &report["result"][key]);
+        let narrower = number(&widest["lower"]) < number(&start["clearance"]);
+        assert_eq!(start["limited"], !narrower, "{start} {widest}");
+        !narrower
+    };
+    assert!(!limited(MIDDLE));
+    // 0.3 from the surface of an atom at (4.2, 8.4, 8.4).
+    assert!(limited("--start 6.2,8.4,8.4 --start-search 0"));
+}
+
+#[test]
+fn a_table_of_radii_makes_ways_wider_by_as_much() {
+    let place = Workplace::new();
+    place.put("a.pdb", crystal());
+    let run = |words: &str| {
+        let line = format!("tunnels a.pdb {MIDDLE} --start-search 0 --count 1 -q {words}");
+        let ran = place.run(&line);
+        assert_eq!(ran.code, 0, "{words}: {}", ran.stderr);
+        ran.document()
+    };
+    let width = |report: &Value| number(&report["result"]["widest"]["radius"]);
+    let first = run("");
+    assert_eq!(first["parameters"]["radii"], Value::Null);
+    for (table, wider) in [
+        ("C 1.5\n", 0.2),
+        ("# ours\nC 1.6\nN 9\n", 0.1),
+        ("ALA CA 1.7\nALA CB 1.7\nC 0.5\n", 0.0),
+    ] {
+        place.put("radii.txt", table);
+        let report = run("--radii radii.txt");
+        assert_eq!(report["parameters"]["radii"], "radii.txt");
+        let off = width(&report) - width(&first) - wider;
+        assert!(off.abs() < 1e-9, "{table}: {off}");
+    }
+    for (table, code, place_of_fault) in [
+        (Some("C 1.7\nC x\n"), 3, "radii.txt:2: "),
+        (Some("C -1\n"), 3, "radii.txt:1: "),
+        (None, 3, "none.txt: cannot read"),
+    ] {
+        let file = if table.is_some() {
+            "radii.txt"
+        } else {
+            "none.txt"
+        };
+        place.put("radii.txt", table.unwrap_or_default());
+        let ran = place.run(&format!("tunnels a.pdb {MIDDLE} --radii {file}"));
+        assert_eq!(ran.code, code, "{}", ran.stderr);
+        assert!(
+            ran.stderr.contains(place_of_fault),
+            "{table:?}: {}",
+            ran.stderr
+        );
+        assert_eq!(ran.stdout, b"");
+    }
+}
+
+#[test]
+fn clusters_hold_the_tunnels_of_all_frames() {
+    let place = Workplace::new();
+    place.put("a.pdb", crystal());
+    // One frame with a channel, which is wider than any way of the others.
+    let closes = ["   8.400   4.200   8.400", "   8.400   0.000   8.400"];
+    let open: String = crystal()
+        .lines()
+        .filter(|line| !closes.iter().any(|place| line.contains(place)))
+        .flat_map(|line| [line, "\n"])
+        .collect();
+    place.put("b.pdb", models(&[&crystal(), &open]));
+    let line = format!(
+        "tunnels a.pdb b.pdb {MIDDLE} --models all --count 2 --clusters c.json --cluster-threshold 3 -q"
+    );
+    let ran = place.run(&line);
+    assert_eq!(ran.code, 0, "{}", ran.stderr);
+    let reports = ran.documents();
+    let second = list(&reports[1]["result"]["other_models"]);
+    let found = [&reports[0]["result"], &reports[1]["result"], &second[0]];
+    let text = fs::read_to_string(place.path("c.json")).expect("clusters");
+    assert!(text.ends_with("}\n"), "{text}");
+    let document: Value = serde_json::from_str(&text).expect("JSON");
+    assert_eq!(number(&document["threshold"]), 3.0);
+    let frames: Vec<_> = list(&document["frames"])
+        .iter()
+        .map(|f| {
+            (
+                f["input"].as_str(),
+                f["model"].as_u64(),
+                f["tunnels"].as_u64(),
+            )
+        })
+        .collect();
+    let count = |k: usize| Some(list(&found[k]["tunnels"]).len() as u64);
+    assert_eq!(
+        frames,
+        [
+            (Some("a.pdb"), Some(1), count(0)),
+            (Some("b.pdb"), Some(1), count(1)),
+            (Some("b.pdb"), Some(2), count(2))
+        ]
+    );
+    let clusters = list(&document["clusters"]);
+    let all: u64 = clusters.iter().filter_map(|c| c["tunnels"].as_u64()).sum();
+    assert_eq!(Some(all), (0..3).map(count).sum::<Option<u64>>());
+    let (mut gaps, mut shared) = (0, 0);
+    for cluster in clusters {
+        let by_frame = list(&cluster["by_frame"]);
+        assert_eq!(by_frame.len(), 3);
+        for (seen, result) in by_frame
+            .iter()
+            .zip(found)
+            .filter(|(seen, _)| !seen.is_null())
+        {
+            let is_it = |tunnel: &&Value| {
+                tunnel["bottleneck"]["lower"] == seen["bottleneck"]
+                    && tunnel["length"] == seen["length"]
+                    && tunnel["throughput"] == seen["throughput"]
+            };
+            assert!(list(&result["tunnels"]).iter().any(|t| is_it(&t)), "{seen}");
+        }
+        // The first two frames are the same molecule.
+        assert_eq!(by_frame[0], by_frame[1]);
+        let seen: Vec<&Value> = by_frame.iter().filter(|seen| !seen.is_null()).collect();
+        assert_eq!(cluster["frames"].as_u64(), Some(seen.len() as u64));
+        let easy: f64 = seen.iter().map(|s| number(&s["throughput"])).sum();
+        assert!((number(&cluster["priority"]) - easy / 3.0).abs() < 1e-12);
+        let widths: Vec<f64> = seen.iter().map(|s| number(&s["bottleneck"])).collect();
+        let mean = widths.iter().sum::<f64>() / widths.len() as f64;
+        let [low, middle, high] = [0, 1, 2].map(|k| number(&cluster["bottleneck"][k]));
+        assert_eq!(low, widths.iter().copied().fold(f64::INFINITY, f64::min));
+        assert_eq!(high, widths.iter().copied().fold(0.0, f64::max));
+        assert!((middle - mean).abs() < 1e-12);
+        gaps += 3 - seen.len();
+        shared += usize::from(seen.len() > 1);
+    }
+    assert!(gaps > 0 && shared > 0, "{document}");
+    let priorities = clusters.iter().map(|c| number(&c["priority"]));
+    assert!(priorities.is_sorted_by(|a, b| a >= b), "{document}");
+}

@@ -107,3 +107,49 @@ impl Origin {
         Some(cell).filter(|cell| graph.cell(*cell).is_finite())
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::tests::{crystal, held, ideal, solve};
+    use super::super::{Exit, Method, Params};
+
+    #[test]
+    fn a_start_narrower_than_every_gate_limits_the_way() {
+        let balls = crystal(&[[0.0; 3]], 7, 6.0, 1.7);
+        // Gates have 6 / sqrt 2 - 1.7 = 2.54; 2 from an atom's centre there is 0.3.
+        let start = [18.0, 18.0, 20.0];
+        let methods = [
+            Method::Conservative,
+            Method::Approximate,
+            Method::Exact,
+            Method::Balls(6),
+        ];
+        for method in methods {
+            let widest = ideal(&balls, start, method);
+            assert!((widest.width - 0.3).abs() < 1e-6, "{method:?}: {widest:?}");
+            assert!(widest.lower <= 0.3 + 1e-12 && widest.upper <= 0.3 + 1e-12);
+            assert!(widest.lower > 0.3 - 1e-6, "{method:?}: {widest:?}");
+            assert_eq!(widest.narrowest.point, start, "{method:?}");
+            let found = solve(&balls, start, &held(method));
+            assert!(
+                widest.lower >= found.start.clearance,
+                "{method:?}: {widest:?}"
+            );
+        }
+        // It does so for ways to the solvent too, and a wider place near does not.
+        let to_shell = Params {
+            exit: Exit::Shell,
+            ..held(Method::Approximate)
+        };
+        let found = solve(&balls, start, &to_shell);
+        let widest = found.widest.expect("a way");
+        assert!((widest.lower - found.start.clearance).abs() < 1e-12);
+        let moved = Params {
+            start_search: 5.0,
+            ..to_shell
+        };
+        let found = solve(&balls, start, &moved);
+        let widest = found.widest.expect("a way");
+        assert!(widest.upper < found.start.clearance - 0.5, "{widest:?}");
+    }
+}
