@@ -1,12 +1,13 @@
 //! What a command works in: threads, memory, and the reports of its jobs.
 
-use crate::destination::{self, Beside, Destination, Extra, Reads, Target, Writes};
+use crate::destination::{self, Beside, Destination, Extra, Target};
 use crate::exit::Exit;
 use crate::job::{Found, Job};
 use crate::machine::{self, Moment};
 use crate::progress;
 use crate::shared::{Common, InputFormat, Inputs, Output, Preview};
 use crate::streams::{complain, print};
+use crate::taken::{Reads, Taken, Writes, check_streams};
 use rayon::{ThreadPool, ThreadPoolBuilder};
 use scantle::error::{Error, Result};
 use scantle::io::format::Format;
@@ -14,6 +15,7 @@ use scantle::io::sink::Sink;
 use serde::Serialize;
 use std::cell::Cell;
 use std::slice;
+use std::sync::Mutex;
 
 /// Threads, memory limit and clock of one run.
 pub struct Context<'a> {
@@ -31,6 +33,10 @@ pub struct Files<'a> {
     output: Option<&'a Output>,
     extras: Vec<(Extra, &'a str)>,
     labelled: bool,
+    /// What is read beside the inputs.
+    beside: Vec<Reads>,
+    /// What is written once, for all inputs: the option, and where.
+    once: Vec<(&'static str, Sink)>,
 }
 
 impl<'a> Files<'a> {
@@ -51,7 +57,17 @@ impl<'a> Files<'a> {
             output: None,
             extras: Vec::new(),
             labelled: false,
+            beside: Vec::new(),
+            once: Vec::new(),
         }
+    }
+
+    /// With a file that an option, one of [`READ`](crate::taken::READ), has read beside the inputs.
+    pub fn reads(mut self, option: &'static str, word: &Option<String>) -> Self {
+        let word = word.as_deref();
+        self.beside
+            .extend(word.map(|word| Reads::beside(option, word)));
+        self
     }
 
     /// With a result that is written where the user says.
@@ -77,6 +93,25 @@ impl<'a> Files<'a> {
     pub fn also(mut self, extra: Extra, word: &'a Option<String>) -> Self {
         self.extras
             .extend(word.as_deref().map(|word| (extra, word)));
+        self
+    }
+
+    /// All that is read.
+    fn all_read(&self) -> Vec<Reads> {
+        let inputs = self.inputs.iter();
+        let inputs = inputs.map(|word| Reads::input(word, self.format));
+        inputs.chain(self.beside.clone()).collect()
+    }
+
+    /// Errs where standard input is to be read twice: for commands that read what options name before
+    /// [`Context::run`] says so.
+    pub fn check_reads(&self) -> Result<()> {
+        check_streams(&self.all_read())
+    }
+
+    /// With what the command itself writes after all jobs, where an option says.
+    pub fn once(mut self, option: &'static str, sink: Option<&Sink>) -> Self {
+        self.once.extend(sink.map(|sink| (option, sink.clone())));
         self
     }
 
@@ -199,13 +234,14 @@ impl<'a> Context<'a> {
         let outputs = files.plan_outputs()?;
         let extras = files.plan_extras()?;
         let report = self.report_sink(outputs.as_deref())?;
-        let memory = self.memory;
-        refuse_conflicts(files, memory, outputs.as_deref(), &extras, &report)?;
+        let taken = taken(files, self.memory, outputs.as_deref(), &extras, &report)?;
+        let taken = Mutex::new(taken);
         let results = outputs.iter().flatten().map(|target| &target.place);
         results
             .chain(extras.iter().flatten().map(|beside| &beside.place))
             .try_for_each(Destination::check)?;
-        report.iter().try_for_each(destination::check_place)?;
+        let once = files.once.iter().map(|(_, sink)| sink);
+        once.chain(&report).try_for_each(destination::check_place)?;
 
         let with_bar = !self.common.talk.quiet && progress::is_watched();
         let start = Cell::new(self.start);
@@ -214,7 +250,7 @@ impl<'a> Context<'a> {
         for ((index, inputs), extras) in jobs.iter().enumerate().zip(extras) {
             let output = outputs.as_ref().map(|all| all[index].clone());
             let mut job = Job::new(self, inputs, files.format, start.get(), with_bar);
-            job.send_to(output, extras);
+            job.send_to(output, extras, &taken);
             let found = self.pool.install(|| work(&mut job));
             worst = worst.max(match found {
                 Err(error) => job.fail(error),
@@ -263,33 +299,27 @@ fn ending<T>(result: Result<T>) -> Exit {
     }
 }
 
-fn refuse_conflicts(
+/// All places of a run: what is read, and what is written where.
+fn taken(
     files: &Files,
     memory: u64,
     outputs: Option<&[Target]>,
     extras: &[Vec<Beside>],
     report: &Option<Sink>,
-) -> Result<()> {
-    if files.inputs.iter().filter(|input| *input == "-").count() > 1 {
-        let problem = "standard input can be read only once";
-        return Err(Error::parameter("input", "-", problem));
-    }
+) -> Result<Taken> {
+    let mut taken = Taken::by(files.all_read(), memory)?;
     let outputs = outputs.into_iter().flatten();
     let extras = extras.iter().flatten();
-    let place = |option, sink, format| Writes {
+    let place = |option, sink| Writes {
         option,
         sink,
-        format,
+        format: None,
     };
-    let written: Vec<_> = outputs
-        .map(|to| place("output", &to.place.sink, Some(to.format)))
-        .chain(extras.map(|to| place(to.option, &to.place.sink, None)))
-        .chain(report.iter().map(|sink| place("report", sink, None)))
-        .collect();
-    let reads = Reads {
-        words: files.inputs,
-        format: files.format,
-        memory,
-    };
-    destination::refuse_overlap(&reads, &written)
+    outputs
+        .map(Target::writes)
+        .chain(extras.map(|to| place(to.option, &to.place.sink)))
+        .chain(files.once.iter().map(|(option, sink)| place(option, sink)))
+        .chain(report.iter().map(|sink| place("report", sink)))
+        .try_for_each(|output| taken.take(&output))?;
+    Ok(taken)
 }

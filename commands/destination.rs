@@ -1,14 +1,16 @@
 //! Where results go: `-o`, `--preview` and their like made into one file per input.
 
+use crate::taken::Writes;
 use scantle::error::{Error, Result};
-use scantle::io;
 use scantle::io::format::Format;
 use scantle::io::sink::Sink;
-use scantle::io::source::Source;
 use std::collections::BTreeMap;
 use std::fs;
 use std::io::{Error as IoError, ErrorKind};
-use std::path::{Component, Path, PathBuf};
+use std::path::{Path, PathBuf};
+
+/// What stands for the label in the place of a result.
+const LABEL: &str = "{label}";
 
 /// Where the result of one input goes.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -113,6 +115,29 @@ pub struct Beside {
 }
 
 impl Target {
+    /// It as an output of `--output`.
+    pub fn writes(&self) -> Writes<'_> {
+        Writes {
+            option: "output",
+            sink: &self.place.sink,
+            format: Some(self.format),
+        }
+    }
+
+    /// It for one label, where there is a file for each.
+    pub fn of_label(&self, label: &str) -> Self {
+        let mut own = self.clone();
+        let path = self.place.sink.path().display().to_string();
+        own.place.sink = Sink::new(&path.replace(LABEL, label));
+        own
+    }
+
+    /// Whether there is a file for each label.
+    pub fn takes_labels(&self) -> bool {
+        let path = self.place.sink.path().display().to_string();
+        path.contains(LABEL)
+    }
+
     /// The error of a format that cannot be what is asked for, blamed on the option that said it.
     pub fn wrong(&self, problem: impl Into<String>) -> Error {
         if self.is_named {
@@ -242,135 +267,6 @@ pub fn stem(input: &str) -> String {
     }
     name.file_stem()
         .map_or(String::new(), |stem| stem.display().to_string())
-}
-
-/// What a run reads: words of the command line, and how they are read.
-pub struct Reads<'a> {
-    /// The inputs.
-    pub words: &'a [String],
-    /// The format they are in, where the user says so.
-    pub format: Option<Format>,
-    /// Bytes that may be held.
-    pub memory: u64,
-}
-
-/// What a run writes.
-pub struct Writes<'a> {
-    /// The option that says where, without dashes.
-    pub option: &'static str,
-    /// Where.
-    pub sink: &'a Sink,
-    /// In which format, where that may mean a second file.
-    pub format: Option<Format>,
-}
-
-impl Writes<'_> {
-    /// The files that are replaced, each with what it is called beside the option.
-    fn files(&self) -> Vec<(&'static str, PathBuf)> {
-        let Sink::File(path) = self.sink else {
-            return Vec::new();
-        };
-        let beside = self.format.and_then(|f| io::written_beside(path, f));
-        let all = [("", Some(path.clone())), ("the data of ", beside)];
-        all.into_iter()
-            .filter_map(|(part, path)| Some((part, path?)))
-            // What is a pipe or a device holds nothing that could be lost.
-            .filter(|(_, path)| fs::metadata(path).map_or(true, |m| m.is_file() || m.is_dir()))
-            .collect()
-    }
-}
-
-/// Refuses to write over an input or the data beside one, or twice to one place.
-///
-/// Names are compared as the places they lead to, whether or not a file is there yet.
-pub fn refuse_overlap(reads: &Reads, outputs: &[Writes]) -> Result<()> {
-    let read: Vec<PathBuf> = reads
-        .words
-        .iter()
-        .filter_map(|input| fs::canonicalize(input).ok())
-        .collect();
-    // A file that is not there is data of no input; and looking costs a look into each input.
-    let mut files = outputs.iter().flat_map(Writes::files);
-    let data = if files.any(|(_, path)| path.exists()) {
-        reads.words.iter().flat_map(|w| data_of(w, reads)).collect()
-    } else {
-        Vec::new()
-    };
-    let mut written: Vec<(String, PathBuf)> = Vec::new();
-    let mut streamed: Option<&str> = None;
-    for output in outputs {
-        let shown = output.sink.path().display();
-        let refuse = |problem: String| Err(Error::parameter(output.option, &shown, problem));
-        if *output.sink == Sink::Stdout
-            && let Some(other) = streamed.replace(output.option)
-        {
-            return refuse(format!("is where --{other} goes already"));
-        }
-        for (part, path) in output.files() {
-            let there = place_of(&path);
-            let it = if part.is_empty() {
-                String::new()
-            } else {
-                format!("its data goes to {}, which ", path.display())
-            };
-            if read.contains(&there) {
-                return refuse(format!("{it}is an input, and inputs are never touched"));
-            }
-            if let Some((_, input)) = data.iter().find(|(data, _)| *data == there) {
-                return refuse(format!(
-                    "{it}holds the data of {input}, and inputs are never touched"
-                ));
-            }
-            if let Some((other, _)) = written.iter().find(|(_, taken)| *taken == there) {
-                return refuse(format!("{it}is where {other} goes already"));
-            }
-            written.push((format!("{part}--{}", output.option), there));
-        }
-    }
-    Ok(())
-}
-
-/// The files beside an input that hold data of it, each with the input's name. What cannot be read
-/// has none, and neither has what can be read only once.
-fn data_of<'a>(input: &'a str, reads: &Reads) -> Vec<(PathBuf, &'a str)> {
-    if !Path::new(input).is_file() {
-        return Vec::new();
-    }
-    let Ok(source) = Source::open(input, reads.memory) else {
-        return Vec::new();
-    };
-    let beside = io::companions(&source, reads.format).into_iter();
-    beside
-        .filter_map(|path| Some((fs::canonicalize(path).ok()?, input)))
-        .collect()
-}
-
-/// Where a path leads to: links are followed, and of what is not there yet, the folders that are.
-fn place_of(path: &Path) -> PathBuf {
-    if let Ok(there) = fs::canonicalize(path) {
-        return there;
-    }
-    let folder = path.parent().filter(|f| !f.as_os_str().is_empty());
-    match path.file_name() {
-        Some(name) => place_of_folder(folder.unwrap_or(Path::new("."))).join(name),
-        None => path.to_owned(),
-    }
-}
-
-/// As [`place_of`], for a folder that may yet be made; `..` goes up from where it leads.
-fn place_of_folder(folder: &Path) -> PathBuf {
-    let here = Path::new(".");
-    let mut there = fs::canonicalize(here).unwrap_or(here.to_owned());
-    for part in folder.components() {
-        match part {
-            Component::ParentDir if !there.exists() => {
-                there.pop();
-            }
-            part => there.push(part),
-        }
-        there = fs::canonicalize(&there).unwrap_or(there);
-    }
-    there
 }
 
 #[cfg(test)]

@@ -3,12 +3,14 @@
 use crate::context::Context;
 use crate::destination::{Beside, Extra, Target};
 use crate::exit::Exit;
+pub use crate::found::Found;
 use crate::machine::{Moment, peak_bytes};
 use crate::progress::Recorder;
 use crate::streams::{complain, say};
+use crate::taken::Taken;
 use crate::words;
 use scantle::anim::Clip;
-use scantle::error::{Error, Result, number};
+use scantle::error::{Error, Result};
 use scantle::image::samples::Image;
 use scantle::io::format::{Format, Kind};
 use scantle::io::sink::Sink;
@@ -17,102 +19,12 @@ use scantle::io::{self, Content};
 use scantle::mesh::Mesh;
 use scantle::progress::Progress;
 use scantle::protein::Molecule;
-use scantle::report::{
-    Accuracy, Input, Measures, Modelled, Output, Report, Run, SCHEMA, Stage, Warning,
-};
+use scantle::report::{Input, Output, Report, Run, SCHEMA, Stage, Warning};
 use scantle::volume::Volume;
 use serde::Serialize;
 use serde_json::Value;
 use std::path::Path;
-
-/// What stands for the label in the place of a result.
-const LABEL: &str = "{label}";
-
-/// What a command found: the part of the report that is its own.
-pub struct Found<P, R> {
-    parameters: P,
-    result: R,
-    summary: String,
-    accuracy: Option<Measures>,
-    modelled: Option<Modelled>,
-    check: Option<(&'static str, f64)>,
-    beyond: Option<String>,
-}
-
-impl<P, R> Found<P, R> {
-    /// Parameters and result for the report, and a few words for a person.
-    pub fn new(parameters: P, result: R, summary: impl Into<String>) -> Self {
-        Found {
-            parameters,
-            result,
-            summary: summary.into(),
-            accuracy: None,
-            modelled: None,
-            check: None,
-            beyond: None,
-        }
-    }
-
-    /// With the error that was made.
-    pub fn accuracy(mut self, accuracy: Measures) -> Self {
-        self.accuracy = Some(accuracy);
-        self
-    }
-
-    /// With how much of the full model was built.
-    pub fn modelled(mut self, modelled: Modelled) -> Self {
-        self.modelled = Some(modelled);
-        self
-    }
-
-    /// With the check that the error is no larger than what `--OPTION` says, if it says anything.
-    pub fn check(mut self, option: &'static str, most: Option<f64>) -> Self {
-        self.check = most.map(|most| (option, most));
-        self
-    }
-
-    /// With what no measure tells, if there is anything: the check fails for it, whatever it allows.
-    pub fn beyond_measure(mut self, what: Option<String>) -> Self {
-        self.beyond = what;
-        self
-    }
-
-    /// Why the check fails, if it was asked for and does. It is about the first measure.
-    fn failure(&self) -> Option<String> {
-        let (option, most) = self.check?;
-        if let Some(what) = &self.beyond {
-            return Some(format!("{what}, which no --{option} allows"));
-        }
-        let first = match &self.accuracy {
-            Some(Measures::One(accuracy)) => Some(accuracy),
-            Some(Measures::Many(all)) => all.first(),
-            None => None,
-        };
-        let Some(Accuracy {
-            measure,
-            unit,
-            bound,
-            reached,
-            ..
-        }) = first
-        else {
-            return Some(format!("no error is known to compare with --{option}"));
-        };
-        let (verb, error) = match (reached, bound) {
-            (Some(reached), _) => ("is", *reached),
-            (None, Some(bound)) => ("may be up to", *bound),
-            (None, None) => {
-                return Some(format!(
-                    "{measure} is neither measured nor bounded; --verify measures it"
-                ));
-            }
-        };
-        // Written so that an error which is no number fails too.
-        let holds = error <= most;
-        let [error, most] = [error, most].map(number);
-        (!holds).then(|| format!("{measure} {verb} {error} {unit}, larger than --{option} {most}"))
-    }
-}
+use std::sync::Mutex;
 
 /// One job: reads, writes, and keeps what the report will say about that.
 pub struct Job<'a> {
@@ -121,12 +33,14 @@ pub struct Job<'a> {
     format: Option<Format>,
     output: Option<Target>,
     extras: Vec<Beside>,
-    unwritten: Vec<Error>,
+    /// What went wrong without ending the job.
+    aside: Vec<Error>,
     recorder: Recorder,
     read: Vec<Input>,
     written: Vec<Output>,
     warnings: Vec<Warning>,
     opened: usize,
+    taken: Option<&'a Mutex<Taken>>,
 }
 
 impl<'a> Job<'a> {
@@ -143,18 +57,26 @@ impl<'a> Job<'a> {
             format,
             output: None,
             extras: Vec::new(),
-            unwritten: Vec::new(),
+            aside: Vec::new(),
             recorder: Recorder::new(start, with_bar),
             read: Vec::new(),
             written: Vec::new(),
             warnings: Vec::new(),
             opened: 0,
+            taken: None,
         }
     }
 
-    pub(crate) fn send_to(&mut self, output: Option<Target>, extras: Vec<Beside>) {
+    /// Where it writes; `taken` are the places of all jobs.
+    pub(crate) fn send_to(
+        &mut self,
+        output: Option<Target>,
+        extras: Vec<Beside>,
+        taken: &'a Mutex<Taken>,
+    ) {
         self.output = output;
         self.extras = extras;
+        self.taken = Some(taken);
     }
 
     /// Who hears how far the work is.
@@ -254,17 +176,28 @@ impl<'a> Job<'a> {
 
     /// Whether the result is a file for each label.
     pub fn takes_labels(&self) -> bool {
-        let path = self.output.as_ref().map(|target| target.place.sink.path());
-        path.is_some_and(|path| path.display().to_string().contains(LABEL))
+        self.output.as_ref().is_some_and(Target::takes_labels)
     }
 
-    /// Writes the result of one label, where there is a file for each.
-    pub fn write_labelled(&mut self, label: &str, mesh: &Mesh) -> Result<()> {
-        let all = self.output.clone();
-        if let Some(target) = &mut self.output {
-            let path = target.place.sink.path().display().to_string();
-            target.place.sink = Sink::new(&path.replace(LABEL, label));
+    /// Refuses, before any work, labels whose file would go over what is read, or where something else goes.
+    pub fn expect_labels(&self, labels: impl Iterator<Item = String>) -> Result<()> {
+        let (Some(target), Some(taken)) = (&self.output, self.taken) else {
+            return Ok(());
+        };
+        if !target.takes_labels() {
+            return Ok(());
         }
+        let mut taken = taken.lock().expect("no one panics with it");
+        for label in labels {
+            taken.take(&target.of_label(&label).writes())?;
+        }
+        Ok(())
+    }
+
+    /// Writes the result of one label, where there is a file for each; see [`Job::expect_labels`].
+    pub fn write_labelled(&mut self, label: &str, mesh: &Mesh) -> Result<()> {
+        let own = self.output.as_ref().map(|all| all.of_label(label));
+        let all = std::mem::replace(&mut self.output, own);
         let written = self.write_mesh(mesh);
         self.output = all;
         written
@@ -355,8 +288,14 @@ impl<'a> Job<'a> {
         });
         match made {
             Ok(output) => self.written.push(output),
-            Err(error) => self.unwritten.push(error),
+            Err(error) => self.set_aside(error),
         }
+    }
+
+    /// Keeps what went wrong with a part of the work until the end of the job, which goes on: it is said
+    /// then, and the exit code tells it.
+    pub fn set_aside(&mut self, error: Error) {
+        self.aside.push(error);
     }
 
     /// Ends the job: says what is for people, and returns the report's bytes and the exit code.
@@ -373,9 +312,7 @@ impl<'a> Job<'a> {
             say(format_args!("{}: check failed: {why}", self.words[0]));
         }
         let mut exit = failure.map_or(Exit::Done, |_| Exit::CheckFailed);
-        for error in std::mem::take(&mut self.unwritten) {
-            exit = exit.max(self.complain(error));
-        }
+        exit = exit.max(self.complain_aside());
         let run = self.context.common().timings.then(|| Run {
             wall_s: stages.iter().map(|stage| stage.wall_s).sum(),
             cpu_s: stages.iter().map(|stage| stage.cpu_s).sum(),
@@ -403,7 +340,15 @@ impl<'a> Job<'a> {
     /// Ends the job that failed: says why, with the file that it is about.
     pub(crate) fn fail(mut self, error: Error) -> Exit {
         self.recorder.finish();
-        self.complain(error)
+        let aside = self.complain_aside();
+        aside.max(self.complain(error))
+    }
+
+    /// Says all that was set aside.
+    fn complain_aside(&mut self) -> Exit {
+        let aside = std::mem::take(&mut self.aside).into_iter();
+        let exits = aside.map(|error| self.complain(error));
+        exits.max().unwrap_or(Exit::Done)
     }
 
     /// Says what went wrong, with the file that it is about.
@@ -444,54 +389,5 @@ impl<'a> Job<'a> {
                 ));
             }
         }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn found(reached: Option<f64>, bound: Option<f64>, most: Option<f64>) -> Found<(), ()> {
-        let accuracy = Accuracy {
-            measure: "distance".into(),
-            unit: "voxel".into(),
-            bound,
-            reached,
-            reference: "sphere".into(),
-            verified: reached.is_some(),
-        };
-        Found::new((), (), "")
-            .accuracy(Measures::One(accuracy))
-            .check("max-error", most)
-    }
-
-    #[test]
-    fn the_error_reached_is_checked_and_else_its_bound() {
-        assert_eq!(found(Some(2.0), None, None).failure(), None);
-        assert_eq!(found(Some(0.5), Some(0.9), Some(0.5)).failure(), None);
-        assert_eq!(
-            found(Some(0.6), Some(0.9), Some(0.5)).failure().as_deref(),
-            Some("distance is 0.6 voxel, larger than --max-error 0.5")
-        );
-        assert_eq!(
-            found(None, Some(0.9), Some(0.5)).failure().as_deref(),
-            Some("distance may be up to 0.9 voxel, larger than --max-error 0.5")
-        );
-        assert!(found(Some(f64::NAN), None, Some(0.5)).failure().is_some());
-        assert!(found(None, None, Some(0.5)).failure().is_some());
-        let nothing: Found<(), ()> = Found::new((), (), "").check("max-error", Some(1.0));
-        assert!(nothing.failure().is_some());
-    }
-
-    #[test]
-    fn what_no_measure_tells_fails_only_a_check() {
-        let beyond = |most| found(Some(0.0), None, most).beyond_measure(Some("x is gone".into()));
-        assert_eq!(beyond(None).failure(), None);
-        assert_eq!(
-            beyond(Some(9.0)).failure().as_deref(),
-            Some("x is gone, which no --max-error allows")
-        );
-        let nothing = found(Some(0.0), None, Some(0.0)).beyond_measure(None);
-        assert_eq!(nothing.failure(), None);
     }
 }

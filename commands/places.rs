@@ -1,12 +1,14 @@
 //! Where the commands that run another one put what they found.
 
-use crate::destination::{Reads, Writes, check_place, refuse_overlap};
+use crate::destination::check_place;
 use crate::exit::Exit;
 use crate::machine::default_memory;
 use crate::shared::Wrapping;
 use crate::streams::{complain, print};
 use crate::table::Table;
+use crate::taken::{Taken, Writes};
 use crate::words;
+use crate::wrapped::Wrapped;
 use scantle::error::{Error, Result};
 use scantle::image::plot::Plot;
 use scantle::io::sink::Sink;
@@ -49,9 +51,9 @@ pub struct Places {
 }
 
 impl Places {
-    /// Errs, before any work, where two results would go to one place or over an input, or a folder
-    /// is not there or stands in the way.
-    pub fn new(wrapping: &Wrapping, inputs: &[String]) -> Result<Self> {
+    /// Errs, before any work, where two results would go to one place or over what the command reads, or a
+    /// folder is not there or stands in the way.
+    pub fn new(wrapping: &Wrapping, wrapped: &Wrapped) -> Result<Self> {
         let places = Places {
             csv: wrapping.csv.as_deref().map(Sink::new),
             plot: wrapping.plot.as_deref().map(Picture::new).transpose()?,
@@ -66,12 +68,8 @@ impl Places {
         let plot = places.plot.iter().map(|plot| place("plot", &plot.sink));
         let report = [place("report", &places.report)];
         let written: Vec<_> = plot.chain(csv).chain(report).collect();
-        let reads = Reads {
-            words: inputs,
-            format: None,
-            memory: default_memory(),
-        };
-        refuse_overlap(&reads, &written)?;
+        let mut taken = Taken::by(wrapped.reads(), default_memory())?;
+        written.iter().try_for_each(|place| taken.take(place))?;
         written
             .iter()
             .try_for_each(|place| check_place(place.sink))?;

@@ -2,6 +2,7 @@
 
 mod beside;
 mod input;
+mod known;
 mod names;
 mod output;
 mod result;
@@ -13,6 +14,7 @@ use crate::job::{Found, Job};
 use crate::shared::{Common, Inputs, MaxError, Output, Preview, Verify, list, named};
 use beside::Other;
 use clap::value_parser;
+use known::Known;
 pub use output::{empty, modelled};
 use result::Stats;
 use scantle::error::{Error, Fault, Result};
@@ -176,23 +178,32 @@ pub fn run(args: &Args) -> Result<Exit> {
     let files = Files::each(&args.inputs)
         .output(&args.output)
         .labelled(args.labels.is_some())
+        .reads("reference", &args.reference)
+        .reads("label-names", &args.label_names)
         .preview(&args.preview);
+    files.check_reads()?;
+    let known = Known::read(args, context.memory())?;
     context.run("smooth-mc", &files, |job| {
-        smooth(job, &params, args, context.memory())
+        smooth(job, &params, args, &known)
     })
 }
 
-fn smooth(job: &mut Job, params: &Params, args: &Args, memory: u64) -> Result<Found<Asked, Stats>> {
+fn smooth(
+    job: &mut Job,
+    params: &Params,
+    args: &Args,
+    known: &Known,
+) -> Result<Found<Asked, Stats>> {
     job.expect_output(&[Kind::Mesh])?;
     match job.read()? {
         Content::Volume(volume) => {
             let (piece, made) = input::of_volume(job, volume, params, args)?;
-            output::finish(job, piece, made, params, args, memory)
+            output::finish(job, piece, made, params, args, known)
         }
         Content::Mesh(mesh) => match input::lattice_of(job, &mesh, params, args)? {
             Some(lattice) => {
                 let (piece, made) = input::of_mesh(job, mesh, lattice, params)?;
-                output::finish(job, piece, made, params, args, memory)
+                output::finish(job, piece, made, params, args, known)
             }
             None => output::of_any_mesh(job, mesh, params, args),
         },

@@ -112,10 +112,8 @@ pub fn run(args: &Args) -> Result<Exit> {
     if let Some(why) = tied(&wrapped) {
         return Ok(runs::refuse("stability", &why));
     }
-    let places = Places::new(&args.wrapping, &wrapped.inputs)?;
-    let format = wrapped.value("input-format");
-    let format = format.as_deref().and_then(Format::from_name);
-    let (subject, input) = match input::read(name, format) {
+    let places = Places::new(&args.wrapping, &wrapped)?;
+    let (subject, input) = match input::read(name, wrapped.format()) {
         Ok(read) => read,
         Err(error) => return Ok(complain(&error, Some(name))),
     };

@@ -90,7 +90,7 @@ pub fn run(args: &Args) -> Result<Exit> {
         Ok(ready) => ready,
         Err(why) => return Ok(runs::refuse("tradeoff", &why)),
     };
-    let places = Places::new(&args.wrapping, &wrapped.inputs)?;
+    let places = Places::new(&args.wrapping, &wrapped)?;
     let params = tradeoff::Params {
         repeat: args.repeat,
         budget_s: args.budget,

@@ -1,6 +1,7 @@
 //! `scantle tunnels`: the widest ways from inside a molecule to the outside.
 
 mod frames;
+mod models;
 mod output;
 mod picture;
 mod plot;
@@ -9,30 +10,29 @@ mod result;
 #[cfg(test)]
 mod sample;
 mod script;
+mod solve;
 
 use crate::context::{Context, Files};
 use crate::exit::Exit;
 use crate::job::{Found, Job};
 use crate::shared::{Common, Inputs, MaxError, Output, Verify, named, not_negative, positive};
+use crate::streams::complain;
 use clap::{ArgGroup, value_parser};
 use frames::Frames;
+use models::{Each, Models};
 use output::Extras;
-use result::{Solved, Stats, Verified};
-use scantle::error::{At, Error, Result};
+use result::Stats;
+use scantle::error::{Error, Result};
+use scantle::io::sink::Sink;
 use scantle::io::source::Source;
-use scantle::measure::passage::passage;
-use scantle::protein::Molecule;
 use scantle::protein::radii::Radii;
-use scantle::protein::select::{SelectParams, Selected, SelectionCounts};
+use scantle::protein::select::SelectionCounts;
 use scantle::protein::start::Start;
-use scantle::protein::tunnels::pores::pores;
-use scantle::protein::tunnels::{
-    Exit as WayOut, Extent, Method, Params, Prefer, Removal, Searched, Start as Place, TRADE,
-    Tunnel, Widest, find,
-};
-use scantle::report::{Accuracy, Measures, Modelled};
+use scantle::protein::tunnels::{Exit as WayOut, Extent, Method, Params, Prefer, Removal};
+use scantle::report::Modelled;
 use schemars::JsonSchema;
 use serde::Serialize;
+use solve::{accuracy, solve, verify};
 
 /// Find the widest ways from inside a molecule to the outside, with a proof
 ///
@@ -108,8 +108,9 @@ pub struct Args {
     /// A table of radii: lines of ELEMENT RADIUS or RESIDUE ATOM RADIUS
     #[arg(long, value_name = "FILE")]
     radii: Option<String>,
-    /// Which models of a file: `first`, `all`, or one by its number
-    #[arg(long, default_value = "first", value_parser = models)]
+    /// Which models of a file: `first`, `all`, where one that fails does not keep the others from it, or
+    /// one by its number
+    #[arg(long, default_value = "first", value_parser = Models::read)]
     models: Models,
     /// Tell which tunnels are the same in all frames, and how wide each is over time, in a JSON file
     #[arg(long, value_name = "FILE")]
@@ -137,25 +138,6 @@ Examples:
   scantle tunnels fixtures/molecules/porthole.xyzr --start 0,0,0
   scantle tunnels fixtures/molecules/porthole.xyzr --start 0,0,0 --method exact -o tunnels.pdb
 ";
-
-/// Which models.
-#[derive(Debug, Clone, Copy, PartialEq)]
-enum Models {
-    First,
-    All,
-    Numbered(i32),
-}
-
-fn models(text: &str) -> Result<Models, String> {
-    match text {
-        "first" => Ok(Models::First),
-        "all" => Ok(Models::All),
-        number => {
-            let number = number.parse().map(Models::Numbered);
-            number.map_err(|_| "neither `first`, `all` nor the number of a model".to_owned())
-        }
-    }
-}
 
 fn method(name: &str) -> Result<Method, String> {
     Method::from_name(name).ok_or_else(|| {
@@ -265,11 +247,7 @@ impl Args {
             step: self.step,
             keep: self.keep.clone(),
             radii: self.radii.clone(),
-            models: match self.models {
-                Models::First => "first".to_owned(),
-                Models::All => "all".to_owned(),
-                Models::Numbered(number) => number.to_string(),
-            },
+            models: self.models.name(),
         }
     }
 }
@@ -279,6 +257,16 @@ pub fn run(args: &Args) -> Result<Exit> {
     let context = Context::new(&args.common)?;
     let params = args.params(context.memory());
     params.check()?;
+    let frames = args
+        .clusters
+        .as_deref()
+        .map(|word| Frames::new(Sink::new(word), args.cluster_threshold));
+    let files = args
+        .extras
+        .of(Files::each(&args.inputs).output(&args.output))
+        .reads("radii", &args.radii)
+        .once("clusters", frames.as_ref().map(Frames::sink));
+    files.check_reads()?;
     let radii = match &args.radii {
         None => Radii::default(),
         Some(word) => {
@@ -290,33 +278,11 @@ pub fn run(args: &Args) -> Result<Exit> {
             })?
         }
     };
-    let files = args
-        .extras
-        .of(Files::each(&args.inputs).output(&args.output));
-    let frames = args
-        .clusters
-        .as_deref()
-        .map(|word| Frames::new(word, args.cluster_threshold, &args.inputs, context.memory()))
-        .transpose()?;
     let exit = context.run("tunnels", &files, |job| {
         tunnels(job, &params, args, &radii, frames.as_ref())
     })?;
-    frames.map_or(Ok(()), Frames::write)?;
-    Ok(exit)
-}
-
-/// One model's atoms that count, and what was found between them.
-pub(crate) struct Model {
-    number: i32,
-    selected: Selected,
-    /// Where ways start; none for pores.
-    start: Option<Place>,
-    widest: Option<Widest>,
-    tunnels: Vec<Tunnel>,
-    merged: u64,
-    /// Mouths, for pores.
-    mouths: Option<u64>,
-    searched: Searched,
+    let written = frames.map_or(Ok(()), Frames::write);
+    Ok(exit.max(written.map_or_else(|error| complain(&error, None), |()| Exit::Done)))
 }
 
 fn tunnels(
@@ -328,178 +294,49 @@ fn tunnels(
 ) -> Result<Found<Asked, Stats>> {
     job.expect_output(&output::KINDS)?;
     let molecule = job.read_molecule()?;
-    let mut solved: Vec<Solved> = Vec::new();
-    let mut first: Option<Model> = None;
-    for index in chosen(&molecule, args.models)? {
+    let path = job.input().map(|input| input.path.clone());
+    let Each {
+        first,
+        own,
+        others,
+        failed,
+    } = models::each(job, &molecule, args.models, |job, index| {
         let model = solve(job, &molecule, index, params, args, radii)?;
-        solved.push(Solved::new(&molecule, &model));
-        if let (Some(frames), Some(input)) = (frames, job.input()) {
-            frames.add(&input.path, &model);
+        if let (Some(frames), Some(path)) = (frames, &path) {
+            frames.add(path, &model);
         }
-        first.get_or_insert(model);
-    }
-    let Some(model) = first else {
-        unreachable!("at least one model is chosen");
-    };
-    job.warn(model.selected.warnings());
-    job.warn(result::warnings(&model, params));
-    let summary = result::summary(&model);
+        Ok(model)
+    })?;
+    job.warn(first.selected.warnings());
+    job.warn(result::warnings(&first, params));
+    let summary = result::summary(&first);
     let verified = match args.verify.verify {
-        true => verify(job, &model, params)?,
+        true => verify(job, &first, params)?,
         false => None,
     };
     job.warn(result::doubts(verified.as_ref()));
     let made = output::Found {
         molecule: &molecule,
-        balls: &model.selected.balls,
-        atoms: &model.selected.atoms,
-        tunnels: &model.tunnels,
+        balls: &first.selected.balls,
+        atoms: &first.selected.atoms,
+        tunnels: &first.tunnels,
         probe_radius: params.probe_radius,
         memory: params.memory,
     };
     output::write(job, &made)?;
-    let accuracy = accuracy(&model, verified.as_ref());
-    let counts: &SelectionCounts = &model.selected.counts;
-    let searched = model.searched;
+    let accuracy = accuracy(&first, verified.as_ref());
+    let counts: &SelectionCounts = &first.selected.counts;
+    let searched = first.searched;
     let made = Modelled::new("atom", searched.atoms, counts.atoms_used, searched.bytes);
-    let mut found = solved.into_iter();
-    let own = found.next().expect("at least one model is chosen");
-    let others: Vec<Solved> = found.collect();
-    let models = (args.models == Models::All).then_some(others);
+    let of_all = args.models == Models::All;
     let stats = Stats {
         own,
         verified,
-        other_models: models,
+        other_models: of_all.then_some(others),
+        failed_models: of_all.then_some(failed),
     };
     let found = Found::new(args.asked(params), stats, summary).modelled(made);
     Ok(found
         .accuracy(accuracy)
         .check("max-error", args.max_error.max_error))
-}
-
-/// Indices of the models that were asked for.
-fn chosen(molecule: &Molecule, models: Models) -> Result<Vec<usize>> {
-    match models {
-        Models::First => Ok(vec![0]),
-        Models::All => Ok((0..molecule.models.len()).collect()),
-        Models::Numbered(number) => {
-            let numbers = || molecule.models.iter().map(|model| model.number);
-            let at = numbers().position(|other| other == number);
-            at.map(|at| vec![at]).ok_or_else(|| {
-                let there: Vec<String> = numbers().map(|n| n.to_string()).collect();
-                let problem = format!("is not there: the models are {}", there.join(", "));
-                Error::parameter("models", number, problem)
-            })
-        }
-    }
-}
-
-fn solve(
-    job: &Job,
-    molecule: &Molecule,
-    index: usize,
-    params: &Params,
-    args: &Args,
-    radii: &Radii,
-) -> Result<Model> {
-    let start = match args.from() {
-        Some(from) => Some(from.resolve(molecule, index)?),
-        None => None,
-    };
-    let select = SelectParams {
-        keep: args.keep.clone(),
-        drop: start.as_ref().map_or(vec![], |start| start.drop.clone()),
-        radii: radii.clone(),
-    };
-    let selected = Selected::of(molecule, index, &select)?;
-    let number = molecule.models[index].number;
-    let Some(start) = start else {
-        let found = pores(&selected.balls, params, job.progress())?;
-        let atoms = selected.balls.len() as u64;
-        return Ok(Model {
-            number,
-            selected,
-            start: None,
-            widest: None,
-            tunnels: found.pores,
-            merged: 0,
-            mouths: Some(found.mouths),
-            searched: Searched {
-                cells: found.cells,
-                gates: found.gates,
-                triangulations: 1,
-                atoms,
-                bytes: found.bytes,
-                ..Searched::default()
-            },
-        });
-    };
-    let found = find(&selected.balls, start.position, params, job.progress());
-    let found = found.map_err(|error| named_atom(error, molecule, &selected))?;
-    Ok(Model {
-        number,
-        selected,
-        start: Some(found.start),
-        widest: found.widest,
-        tunnels: found.tunnels,
-        merged: found.merged,
-        mouths: None,
-        searched: found.searched,
-    })
-}
-
-/// An error about one of the balls as one about an atom of the file.
-fn named_atom(error: Error, molecule: &Molecule, selected: &Selected) -> Error {
-    match error {
-        Error::Geometry(mut fault) => {
-            if let At::Element("atom", ball) = fault.at {
-                let index = selected.atoms[ball as usize];
-                let atom = &molecule.atoms[index as usize];
-                let residue = molecule.residue_of(atom);
-                fault.at = At::Element("atom", u64::from(index));
-                fault.problem += &format!(
-                    ": {} of {} {residue}, serial {}",
-                    atom.name, residue.name, atom.serial
-                );
-            }
-            Error::Geometry(fault)
-        }
-        other => other,
-    }
-}
-
-/// How far apart the bounds of the octree may be, over the width of the start.
-const OCTREE: f64 = 0.005;
-
-/// Finds the exact width of the widest way, and asks an octree, which shares nothing with that, whether it is
-/// right.
-fn verify(job: &Job, model: &Model, params: &Params) -> Result<Option<Verified>> {
-    let (Some(start), Some(_)) = (&model.start, &model.widest) else {
-        return Ok(None);
-    };
-    job.progress().stage("verify", 0);
-    let exact = Params {
-        method: Method::Exact,
-        start_search: 0.0,
-        count: 1,
-        ..*params
-    };
-    let balls = &model.selected.balls;
-    let exact = find(balls, start.used, &exact, job.progress())?;
-    let tolerance = OCTREE * start.clearance;
-    let octree = passage(balls, start.used, tolerance, params.memory, job.progress())?;
-    Ok(exact.widest.map(|exact| Verified::new(&exact, &octree)))
-}
-
-fn accuracy(model: &Model, verified: Option<&Verified>) -> Measures {
-    let widest = model.widest.as_ref();
-    let above = |upper: f64| widest.map(|w| (upper - w.narrowest.radius).max(0.0));
-    Measures::One(Accuracy {
-        measure: TRADE.error.name.to_owned(),
-        unit: TRADE.error.unit.to_owned(),
-        bound: widest.and_then(|w| above(w.upper)),
-        reached: verified.and_then(|v| above(v.exact[1])),
-        reference: TRADE.reference.to_owned(),
-        verified: verified.is_some_and(Verified::agrees),
-    })
 }

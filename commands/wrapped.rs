@@ -1,9 +1,11 @@
 //! A command that another one runs: its words taken apart and put together again.
 
 use crate::cli;
+use crate::taken::{READ, Reads};
 use crate::trade;
 use clap::parser::ValueSource;
 use clap::{Arg, ArgMatches};
+use scantle::io::format::Format;
 use scantle::trade::Trade;
 
 /// A command with its inputs and options.
@@ -52,7 +54,7 @@ impl Wrapped {
                 "--{taken} is set for {name} here, and cannot be given"
             ));
         }
-        if wrapped.inputs.iter().any(|input| input == "-") {
+        if wrapped.reads().iter().any(|reads| reads.word == "-") {
             return Err(format!(
                 "standard input can be read only once, and {name} is run many times: name a file"
             ));
@@ -98,6 +100,24 @@ impl Wrapped {
         self.arg(option)
             .map(|arg| self.raw(arg))
             .unwrap_or_default()
+    }
+
+    /// The format that the inputs are in, where the user says so.
+    pub fn format(&self) -> Option<Format> {
+        let name = self.value("input-format");
+        name.as_deref().and_then(Format::from_name)
+    }
+
+    /// All that it reads: the inputs, and what options name beside them.
+    pub fn reads(&self) -> Vec<Reads> {
+        let format = self.format();
+        let inputs = self.inputs.iter();
+        let inputs = inputs.map(|word| Reads::input(word, format));
+        let beside = READ.iter().flat_map(|option| {
+            let words = self.values(option).into_iter();
+            words.map(|word| Reads::beside(option, &word))
+        });
+        inputs.chain(beside).collect()
     }
 
     /// The options that the user gave, each with its value where it takes one.

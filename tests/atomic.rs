@@ -82,11 +82,116 @@ fn an_input_is_not_written_over_by_any_name() {
 }
 
 #[test]
+fn what_an_option_reads_is_not_written_over() {
+    let place = Workplace::new();
+    place.put("radii.txt", "C 1.7\n");
+    symlink("radii.txt", place.path("radii.json")).unwrap();
+    symlink("radii.txt", place.path("radii.pdb")).unwrap();
+    let grey = fs::read(place.path("fixtures/shapes/grey.ply")).unwrap();
+    place.put("grey.ply", &grey);
+    place.put("1.ply", &grey);
+    symlink("grey.ply", place.path("3.ply")).unwrap();
+    let names = fs::read(place.path("fixtures/volumes/names.csv")).unwrap();
+    place.put("names.csv", &names);
+    let before = place.names();
+    let tunnels = "fixtures/molecules/porthole.xyzr --start 0,0,0 --radii radii.txt";
+    let ball = "fixtures/volumes/ball.nrrd --threshold-value 0 --reference";
+    let labels = "fixtures/volumes/labels.nii --labels all --label-names names.csv";
+    for (line, option) in [
+        (format!("tunnels {tunnels} -o radii.pdb"), "radii"),
+        (format!("tunnels {tunnels} --report radii.txt"), "radii"),
+        (format!("tunnels {tunnels} --clusters radii.json"), "radii"),
+        (
+            format!("tradeoff tunnels {tunnels} --vary method --csv radii.txt"),
+            "radii",
+        ),
+        (
+            format!("smooth-mc {ball} grey.ply -o grey.ply"),
+            "reference",
+        ),
+        (format!("smooth-mc {ball} grey.ply -o 3.ply"), "reference"),
+        (
+            format!("tradeoff smooth-mc {ball} grey.ply --vary energy --csv grey.ply"),
+            "reference",
+        ),
+        (
+            format!("smooth-mc {labels} -o names.csv --output-format ply"),
+            "label-names",
+        ),
+        (
+            format!("smooth-mc {labels} --report names.csv"),
+            "label-names",
+        ),
+        // A file for each label, of which one would go over what is read.
+        (
+            format!("smooth-mc {labels} --reference 1.ply -o {{label}}.ply"),
+            "reference",
+        ),
+        (
+            format!("smooth-mc {labels} --reference grey.ply -o {{label}}.ply"),
+            "reference",
+        ),
+    ] {
+        let ran = place.run(&line);
+        assert_eq!(ran.code, 2, "{line}: {}", ran.stderr);
+        let why = format!("is what --{option} reads, and inputs are never touched");
+        assert!(ran.stderr.contains(&why), "{line}: {}", ran.stderr);
+        assert_eq!(ran.stdout, b"", "{line}");
+    }
+    assert_eq!(place.names(), before);
+    assert_eq!(fs::read(place.path("grey.ply")).unwrap(), grey);
+    assert_eq!(fs::read(place.path("names.csv")).unwrap(), names);
+}
+
+#[test]
+fn the_data_beside_what_an_option_reads_is_not_written_over() {
+    let place = Workplace::new();
+    let gltf = r#"{"asset":{"version":"2.0"},"scenes":[{"nodes":[0]}],"nodes":[{"mesh":0}],
+        "meshes":[{"primitives":[{"attributes":{"POSITION":0}}]}],
+        "accessors":[{"bufferView":0,"componentType":5126,"count":3,"type":"VEC3"}],
+        "bufferViews":[{"buffer":0,"byteLength":36}],
+        "buffers":[{"byteLength":36,"uri":"true.ply"}]}"#;
+    place.put("true.gltf", gltf);
+    let corners = [0.0f32, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0];
+    let data = corners.map(f32::to_le_bytes).concat();
+    place.put("true.ply", &data);
+    let line = "smooth-mc fixtures/volumes/ball.nrrd --threshold-value 0 --reference true.gltf";
+    let ran = place.run(&format!("{line} -o true.ply"));
+    assert_eq!(ran.code, 2, "{}", ran.stderr);
+    assert!(
+        ran.stderr.contains("holds the data of true.gltf"),
+        "{}",
+        ran.stderr
+    );
+    assert_eq!(fs::read(place.path("true.ply")).unwrap(), data);
+}
+
+#[test]
+fn standard_input_is_not_read_twice() {
+    let place = Workplace::new();
+    let porthole = fs::read(place.path("fixtures/molecules/porthole.xyzr")).unwrap();
+    let line = "tunnels - --input-format xyzr --start 0,0,0 --radii -";
+    let ran = place.run_with_input(line, porthole);
+    assert_eq!(ran.code, 2, "{}", ran.stderr);
+    let why = "scantle: --radii -: standard input can be read only once\n";
+    assert_eq!(ran.stderr, why);
+    // For several inputs, what an option reads is read once.
+    let grey = fs::read(place.path("fixtures/shapes/grey.ply")).unwrap();
+    let ball = "fixtures/volumes/ball.nrrd";
+    let line = format!("smooth-mc {ball} {ball} --threshold-value 0 --reference - -q");
+    let ran = place.run_with_input(&line, grey);
+    assert_eq!(ran.code, 0, "{}", ran.stderr);
+    assert_eq!(ran.documents().len(), 2);
+}
+
+#[test]
 fn two_results_do_not_go_to_one_file_that_is_not_there_yet() {
     let place = Workplace::new();
     fs::create_dir(place.path("b")).unwrap();
     symlink("b", place.path("link")).unwrap();
     let cube = "fixtures/shapes/cube.obj";
+    let tunnels = "tunnels fixtures/molecules/porthole.xyzr --start 0,0,0";
+    let labels = "smooth-mc fixtures/volumes/labels.nii --labels all";
     for line in [
         format!("convert {cube} -o ./b/n.ply --report b/n.ply"),
         format!("convert {cube} -o link/n.ply --report b/n.ply"),
@@ -95,6 +200,14 @@ fn two_results_do_not_go_to_one_file_that_is_not_there_yet() {
         format!("voxelize {cube} -o b/z.mhd --report b/z.raw"),
         format!("voxelize {cube} -o b/z.mhd --report link/../b/./z.raw"),
         format!("tradeoff voxelize {cube} --vary resolution=4 --csv b/t --report ./b/t"),
+        format!("{tunnels} --clusters b/t.pdb -o link/t.pdb"),
+        format!("{tunnels} --clusters b/t.csv --profile b/t.csv"),
+        format!("{tunnels} --clusters b/t.svg --plot ./b/t.svg"),
+        format!("{tunnels} --clusters b/t.pml --script b/t.pml"),
+        format!("{tunnels} --clusters b/t.png --preview b/t.png"),
+        format!("{tunnels} --clusters b/t.json --report b/t.json"),
+        format!("{tunnels} --clusters -"),
+        format!("{labels} -o b/{{label}}.ply --report b/3.ply"),
     ] {
         let ran = place.run(&line);
         assert_eq!(ran.code, 2, "{line}: {}", ran.stderr);

@@ -22,5 +22,6 @@ mod properties;
 mod reports;
 mod trade;
 mod tunnel_outputs;
+mod tunnels;
 mod volumes;
 mod voxelize;

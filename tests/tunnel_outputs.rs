@@ -5,7 +5,7 @@ use std::fmt::Write;
 use std::fs;
 
 /// A cubic crystal with a hole in its middle, in the columns of a PDB file: residues of two atoms.
-fn crystal() -> String {
+pub fn crystal() -> String {
     let mut text = String::new();
     for k in 0..216 {
         let [x, y, z] = [k % 6, k / 6 % 6, k / 36].map(|c| 4.2 * f64::from(c));

@@ -2,12 +2,8 @@
 
 use super::Args;
 use super::input::Piece;
-use super::result::Directions;
 use crate::job::Job;
 use scantle::error::{Error, Result};
-use scantle::io::read_mesh;
-use scantle::io::source::Source;
-use scantle::measure::normal_error::normal_rms_deg;
 use scantle::measure::smooth_error::{self, Judged, Smoothed};
 use scantle::mesh::Mesh;
 use scantle::volume::Frame;
@@ -94,25 +90,4 @@ pub fn compare(
         smooth_error::judge(name, &before, mesh, spacing, voxels, memory, job.progress())
     };
     all.iter().map(judge).collect()
-}
-
-/// How far triangles are turned from those of the reference, before and after.
-pub fn directions(
-    piece: &Piece,
-    smooth: &Mesh,
-    args: &Args,
-    memory: u64,
-) -> Result<Option<Directions>> {
-    let Some(file) = &args.reference else {
-        return Ok(None);
-    };
-    let reference = read_mesh(&Source::open(file, memory)?, None)?.0;
-    let before = Mesh {
-        positions: piece.positions(&vec![[0.0; 3]; piece.surface.len()]),
-        ..smooth.clone()
-    };
-    Ok(Some(Directions {
-        before: normal_rms_deg(&before, &reference)?,
-        after: normal_rms_deg(smooth, &reference)?,
-    }))
 }

@@ -58,6 +58,9 @@ pub fn of_volume(
     place(&mut volume.frame, args);
     volume.check_numbers().map_err(Error::Geometry)?;
     let what = select::inside(&volume, args)?;
+    if let Inside::Labels(values) = &what {
+        job.expect_labels(values.iter().copied().map(number))?;
+    }
     let one = what.select();
     let dual = params.constraint == Constraint::CellCenter;
     let several = matches!(what, Inside::Labels(_));

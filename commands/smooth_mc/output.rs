@@ -1,9 +1,10 @@
 //! What is measured, written and reported of a smooth surface.
 
 use super::input::Piece;
+use super::known::Known;
 use super::result::{Body, Stats};
 use super::select::Inside;
-use super::{Args, Asked, beside, names};
+use super::{Args, Asked, beside};
 use crate::job::{Found, Job};
 use scantle::error::{Error, Result, number};
 use scantle::image::colour::{CLAY, OKABE_ITO};
@@ -13,7 +14,6 @@ use scantle::render::preview::{self, Panel, What};
 use scantle::report::{Measures, Modelled, Warning};
 use scantle::volume::isosurface::{self, Select, Surface};
 use scantle::volume::smooth_mc::{self, Made, Params};
-use std::collections::BTreeMap;
 
 /// Measures what was made, writes and reports it.
 pub fn finish(
@@ -22,8 +22,9 @@ pub fn finish(
     (offsets, triangles, smoothing): Made,
     params: &Params,
     args: &Args,
-    memory: u64,
+    known: &Known,
 ) -> Result<Found<Asked, Stats>> {
+    let memory = known.memory;
     job.warn(thin_warning(&smoothing));
     let smoothed = Smoothed {
         surface: &piece.surface,
@@ -40,7 +41,7 @@ pub fn finish(
         })
         .transpose()?;
     let compared = beside::compare(job, &piece, &smoothed, params, args, memory)?;
-    let bodies = bodies(job, &piece, &smoothed, &smoothing, args, memory)?;
+    let bodies = bodies(job, &piece, &smoothed, &smoothing, args, known)?;
     let mirrored = piece.frame.is_mirrored();
     let positions = piece.positions(&offsets);
     let mut mesh = match &piece.mesh {
@@ -68,7 +69,7 @@ pub fn finish(
     } else {
         job.write_mesh(&mesh)?;
     }
-    let turned_by = beside::directions(&piece, &mesh, args, memory)?;
+    let turned_by = known.directions(&piece, &mesh)?;
     let stats = Stats::new(&piece, smoothing, &offsets, triangles.len())
         .with(bodies, verified, compared, turned_by);
     let summary = stats.summary();
@@ -96,15 +97,12 @@ fn bodies(
     smoothed: &Smoothed,
     smoothing: &smooth_mc::Stats,
     args: &Args,
-    memory: u64,
+    known: &Known,
 ) -> Result<Vec<Body>> {
     let (Inside::Labels(values), Some(volume)) = (&piece.inside, &piece.volume) else {
         return Ok(Vec::new());
     };
-    let names = match &args.label_names {
-        Some(file) => names::read(file, memory)?,
-        None => BTreeMap::new(),
-    };
+    let names = &known.names;
     let mut bodies = Vec::with_capacity(values.len());
     for (i, value) in values.iter().enumerate() {
         let own = piece
@@ -118,7 +116,7 @@ fn bodies(
                 ..*smoothed
             };
             let voxels = Voxels::Given(&bits);
-            misclassified_voxels = around.misclassified(voxels, memory, job.progress())?;
+            misclassified_voxels = around.misclassified(voxels, known.memory, job.progress())?;
         }
         let part = &smoothing.parts[i + 1];
         let voxels = part.voxels.unwrap_or(0);

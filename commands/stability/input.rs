@@ -1,7 +1,7 @@
 //! The input that is taken to the extremes: read, told from others, and written again.
 
 use crate::machine;
-use scantle::error::{Error, Result};
+use scantle::error::{Error, Fault, Result};
 use scantle::io::format::{Format, Kind};
 use scantle::io::sink::Sink;
 use scantle::io::source::Source;
@@ -28,8 +28,13 @@ pub fn read(name: &str, format: Option<Format>) -> Result<(Subject, Input)> {
             })?;
             Subject::Atoms(selected.balls)
         }
-        Content::Volume(_) | Content::Image(_) | Content::Animation(_) | Content::Report(_) => {
-            unreachable!("the reader was told which kinds there may be")
+        other => {
+            let found = other.kind().with_article();
+            let problem = format!("holds {found}, but a mesh or a molecule is needed");
+            return Err(Error::Malformed {
+                path: name.into(),
+                fault: Fault::whole(problem),
+            });
         }
     };
     Ok((subject, input))

@@ -1,8 +1,6 @@
 //! The same tunnels in many frames: clusters, and how wide each is over time.
 
-use super::Model;
-use crate::destination::{Reads, Writes, check_place, refuse_overlap};
-use crate::shared::Inputs;
+use super::solve::Model;
 use scantle::error::Result;
 use scantle::io::sink::Sink;
 use scantle::protein::tunnels::cluster::{Course, clusters};
@@ -71,26 +69,18 @@ struct Cluster {
 }
 
 impl Frames {
-    /// Errs, before any work, where the file would go over an input, or cannot be there.
-    pub fn new(word: &str, most: f64, inputs: &Inputs, memory: u64) -> Result<Self> {
-        let sink = Sink::new(word);
-        let reads = Reads {
-            words: &inputs.inputs,
-            format: inputs.format.input_format,
-            memory,
-        };
-        let written = Writes {
-            option: "clusters",
-            sink: &sink,
-            format: None,
-        };
-        refuse_overlap(&reads, &[written])?;
-        check_place(&sink)?;
-        Ok(Frames {
+    /// None yet, to be written there.
+    pub fn new(sink: Sink, most: f64) -> Self {
+        Frames {
             sink,
             most,
             all: Mutex::default(),
-        })
+        }
+    }
+
+    /// Where they are written.
+    pub fn sink(&self) -> &Sink {
+        &self.sink
     }
 
     /// Adds what was found in a model.
@@ -111,9 +101,12 @@ impl Frames {
         self.all.lock().expect("no one panics with it").push(frame);
     }
 
-    /// Writes the clusters.
+    /// Writes the clusters, where there is any frame.
     pub fn write(self) -> Result<()> {
         let frames = self.all.into_inner().expect("no one panics with it");
+        if frames.is_empty() {
+            return Ok(());
+        }
         let courses: Vec<Course> = frames
             .iter()
             .flat_map(|frame| frame.tunnels.iter().map(|shape| shape.course.clone()))

@@ -1,6 +1,7 @@
 //! What the report says of tunnels.
 
-use super::Model;
+use super::models::FailedModel;
+use super::solve::Model;
 use scantle::measure::passage::Passage;
 use scantle::protein::select::SelectionCounts;
 use scantle::protein::tunnels::{Narrowest, Params, Stop, Tunnel, Widest};
@@ -12,7 +13,7 @@ use serde::Serialize;
 /// What was found.
 #[derive(Debug, Serialize, JsonSchema)]
 pub struct Stats {
-    /// The first model that was asked for.
+    /// The first model that was asked for, of those that did not fail.
     #[serde(flatten)]
     pub own: Solved,
     /// The width of the widest way by other means, with `--verify`.
@@ -21,6 +22,9 @@ pub struct Stats {
     /// The others, with `--models all`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub other_models: Option<Vec<Solved>>,
+    /// Models that nothing can be found in, with `--models all`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub failed_models: Option<Vec<FailedModel>>,
 }
 
 /// The width of the widest way, between two bounds each, by two means that share nothing.

@@ -109,3 +109,45 @@ impl<'a> Crop<'a> {
         length(sub(ball.centre, self.centre)) <= self.reach
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::Params;
+    use super::super::tests::{ball, solve};
+    use crate::numeric::rng::Rng;
+
+    #[test]
+    fn no_atoms_are_added_for_ways_beyond_those_asked_for() {
+        // A thick wall with a hole, and at its end a gate to another that goes on far into the wall.
+        let mut rng = Rng::new(22, 0);
+        let mut balls = Vec::new();
+        for index in 0..40 * 56 * 56 {
+            let at = [index % 40 - 12, index / 40 % 56, index / 2240].map(|k| f64::from(k - 28));
+            let [x, y, z] = at.map(|k| 1.6 * (k + rng.range(-0.1, 0.1)));
+            let hole = match x {
+                x if x > -20.0 => 3.7,
+                x if x > -22.0 => 3.1,
+                x if x > -56.0 => 3.7,
+                _ => 0.0,
+            };
+            if y.hypot(z) >= hole {
+                balls.push(ball([x, y, z], 1.5));
+            }
+        }
+        let atoms = |count, probe_radius| {
+            let params = Params {
+                count,
+                probe_radius,
+                ..Params::DEFAULT
+            };
+            let found = solve(&balls, [-10.0, 0.0, 0.0], &params);
+            assert!(!found.tunnels.is_empty());
+            found.searched.atoms
+        };
+        let enough = atoms(1, 2.0);
+        assert!(enough < balls.len() as u64 / 2);
+        assert_eq!(atoms(1, 1.0), enough);
+        // The second way does need them.
+        assert!(atoms(2, 1.0) > enough);
+    }
+}

@@ -19,6 +19,7 @@
 //! same with the smallest is an upper bound, and differs by the difference of the radii alone.
 
 mod balls;
+mod close;
 pub mod cluster;
 mod crop;
 pub mod cut;
@@ -42,7 +43,7 @@ mod tests;
 pub use balls::COUNTS;
 pub use params::{Exit, Method, Params, Removal};
 pub use search::{Extent, Prefer};
-pub use start::Start;
+pub use start::Origin;
 pub use trade::TRADE;
 pub use tunnel::{LINING, Narrowest, Stop, Tunnel};
 
@@ -65,11 +66,23 @@ pub struct Widest {
     pub narrowest: Narrowest,
 }
 
+impl Widest {
+    /// The widest way as the tunnel along it, which is a way as wide as it is.
+    fn along(tunnel: &Tunnel, [lower, upper]: [f64; 2]) -> Self {
+        Widest {
+            width: tunnel.width,
+            lower: lower.max(tunnel.narrowest.radius).min(upper),
+            upper,
+            narrowest: tunnel.narrowest.clone(),
+        }
+    }
+}
+
 /// What was found.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Tunnels {
     /// Where ways start.
-    pub start: Start,
+    pub start: Origin,
     /// The widest of all ways, below the probe's radius too. None without any cells.
     pub widest: Option<Widest>,
     /// Ways at least as wide as the probe, the widest first.

@@ -350,3 +350,54 @@ fn price(graph: &mut Graph, cell: u32, slot: usize, gate: f64, prefer: Prefer) -
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::tests::{ball, held, solve};
+    use super::super::{Method, Params, Tunnel};
+    use super::*;
+    use crate::protein::clearance::Ball;
+
+    /// A block with a room, a throat out of it, and from there two ways out: a short one to the right that
+    /// is as wide as the throat, and a long one upwards that is wider.
+    fn forked() -> Vec<Ball> {
+        let (step, radius) = (0.8, 0.6);
+        let is_open = |[x, y, z]: [f64; 3]| {
+            let room = (x + 5.0).hypot(y).hypot(z) < 1.4 + radius;
+            let throat = x > -5.0 && y.hypot(z) < 1.2 + radius;
+            let upwards = y > 0.0 && x.hypot(z) < 3.0 + radius;
+            room || throat || upwards
+        };
+        let mut balls = Vec::new();
+        for index in 0..20 * 24 * 16 {
+            let [i, j, k] = [index % 20, index / 20 % 24, index / 480].map(f64::from);
+            let place = [i - 9.75, j - 9.75, k - 7.75].map(|n| n * step);
+            if !is_open(place) {
+                balls.push(ball(place, radius));
+            }
+        }
+        balls
+    }
+
+    #[test]
+    fn of_ways_as_wide_the_shortest_or_the_easiest_is_taken() {
+        let balls = forked();
+        let found = |prefer| {
+            let params = Params {
+                prefer,
+                ..held(Method::Approximate)
+            };
+            let tunnels = solve(&balls, [-5.0, 0.0, 0.0], &params).tunnels;
+            assert_eq!(tunnels.len(), 1, "{prefer:?}");
+            tunnels[0].clone()
+        };
+        let short = found(Prefer::Length);
+        let easy = found(Prefer::Cost);
+        let [exit_of_short, exit_of_easy] = [&short, &easy].map(Tunnel::exit);
+        assert!(exit_of_short[0] > 5.0, "{exit_of_short:?}");
+        assert!(exit_of_easy[1] > 5.0, "{exit_of_easy:?}");
+        assert!(short.length < easy.length - 1.0);
+        assert!(easy.cost < short.cost - 1.0);
+        assert_eq!(short.width, easy.width);
+    }
+}

@@ -2,9 +2,9 @@
 
 use super::crop::Crop;
 use super::graph::{Graph, Metric};
-use super::params::{Exit, Method, Params, Removal};
+use super::params::{Exit, Method, Params};
 use super::search::{Closed, Found, Outside, Route, Unfinished, cheapest, widest};
-use super::start::{self, Start};
+use super::start::{self, Origin};
 use super::tunnel::{self, Stop, Tunnel};
 use super::{Searched, Tunnels, Widest, balls, exact, grid};
 use crate::error::Error;
@@ -96,7 +96,7 @@ impl<'a> Search<'a> {
         }
         if searched.cells == 0 {
             return Ok(Tunnels {
-                start: Start::alone(given, self.clearance.at(given)),
+                start: Origin::alone(given, self.clearance.at(given)),
                 widest: None,
                 tunnels: vec![],
                 merged: 0,
@@ -104,7 +104,7 @@ impl<'a> Search<'a> {
             });
         }
         let mut outside = self.outside(&mut graph);
-        let start = Start::find(&mut graph, given, self.params, &mut outside)?;
+        let start = Origin::find(&mut graph, given, self.params, &mut outside)?;
         // With one radius for all, the largest, the triangulation is exact: a bound from both sides.
         let radii = || self.all.iter().map(|ball| ball.radius);
         let largest = radii().fold(f64::NEG_INFINITY, f64::max);
@@ -161,7 +161,7 @@ impl<'a> Search<'a> {
     }
 
     /// Where ways start and end in a graph.
-    fn ends(&self, graph: &mut Graph, start: &Start) -> Result<Ends<'a>, Halt> {
+    fn ends(&self, graph: &mut Graph, start: &Origin) -> Result<Ends<'a>, Halt> {
         let outside = self.outside(graph);
         let cell = start.cell_in(graph);
         let width = graph.width_at(start.used);
@@ -200,7 +200,7 @@ impl<'a> Search<'a> {
     fn candidate(
         &self,
         graph: &mut Graph,
-        start: &Start,
+        start: &Origin,
         searched: &mut Searched,
     ) -> Result<Candidate, Halt> {
         let mut ends = self.ends(graph, start)?;
@@ -228,7 +228,7 @@ impl<'a> Search<'a> {
         graph: &mut Graph,
         route: &Route,
         ends: &Ends,
-        start: &Start,
+        start: &Origin,
     ) -> Vec<[f64; 3]> {
         let mut way = tunnel::centreline(graph, route, &ends.outside);
         if way.first() != Some(&start.used) {
@@ -241,9 +241,9 @@ impl<'a> Search<'a> {
     fn tunnels(
         &self,
         graph: &mut Graph,
-        start: Start,
+        start: Origin,
         width: f64,
-        [lower, upper]: [f64; 2],
+        bounds: [f64; 2],
         searched: Searched,
     ) -> Result<Tunnels, Halt> {
         self.progress.stage("tunnels", self.params.count as u64);
@@ -258,6 +258,10 @@ impl<'a> Search<'a> {
         };
         let most = 50 * self.params.count + 50;
         for round in 0..most {
+            // One more search may only find that more atoms are needed for it.
+            if made.tunnels.len() >= self.params.count {
+                break;
+            }
             // The first is told however narrow it is.
             let least = if round == 0 {
                 f64::NEG_INFINITY
@@ -268,9 +272,6 @@ impl<'a> Search<'a> {
             let Some(route) = found.route else {
                 break;
             };
-            if made.tunnels.len() >= self.params.count {
-                break;
-            }
             // Of all ways that are as wide, the cheapest.
             let prefer = self.params.prefer;
             let width_there = route.width;
@@ -291,12 +292,7 @@ impl<'a> Search<'a> {
             };
             if round == 0 {
                 tunnel.width = width;
-                made.widest = Some(Widest {
-                    width,
-                    lower: lower.max(tunnel.narrowest.radius).min(upper),
-                    upper,
-                    narrowest: tunnel.narrowest.clone(),
-                });
+                made.widest = Some(Widest::along(&tunnel, bounds));
                 if width < self.params.probe_radius {
                     break;
                 }
@@ -322,80 +318,6 @@ impl<'a> Search<'a> {
         Ok(made)
     }
 
-    /// Closes gates of a way, so that the next is another.
-    fn close(&self, graph: &mut Graph, route: &Route, closed: &mut Closed) {
-        let gates: Vec<(u32, usize)> = route
-            .cells
-            .iter()
-            .copied()
-            .zip(route.slots.iter().copied())
-            .collect();
-        let widths: Vec<f64> = gates
-            .iter()
-            .map(|(cell, slot)| graph.gate(*cell, *slot))
-            .collect();
-        let least = widths.iter().copied().fold(f64::INFINITY, f64::min);
-        let minimal = |k: &usize| widths[*k] == least;
-        match self.params.removal {
-            Removal::Narrowest => {
-                for k in (0..gates.len()).filter(minimal) {
-                    closed.close(graph, gates[k].0, gates[k].1);
-                }
-            }
-            Removal::ToSurface => {
-                let first = (0..gates.len()).find(minimal).unwrap_or(0);
-                for (cell, slot) in &gates[first..] {
-                    closed.close(graph, *cell, *slot);
-                }
-            }
-            Removal::Around => {
-                let reach = least.max(self.params.shell_radius * NEAR);
-                for k in (0..gates.len()).filter(minimal) {
-                    let centre = self.gate_point(graph, gates[k].0, gates[k].1);
-                    self.close_around(graph, gates[k], centre, reach, closed);
-                }
-            }
-        }
-    }
-
-    fn gate_point(&self, graph: &mut Graph, cell: u32, slot: usize) -> [f64; 3] {
-        let crossed = graph.narrowest(cell, slot).map(|c| c.point);
-        let ends = [cell, graph.cell(cell).neighbours[slot]].map(|c| graph.node(c));
-        let narrower = if ends[0].width <= ends[1].width {
-            ends[0]
-        } else {
-            ends[1]
-        };
-        crossed.unwrap_or(narrower.centre)
-    }
-
-    /// Closes all gates whose narrowest point is within `reach` of a point, found from one of them.
-    fn close_around(
-        &self,
-        graph: &mut Graph,
-        (cell, slot): (u32, usize),
-        centre: [f64; 3],
-        reach: f64,
-        closed: &mut Closed,
-    ) {
-        closed.close(graph, cell, slot);
-        let mut seen = std::collections::BTreeSet::from([cell, graph.cell(cell).neighbours[slot]]);
-        let mut waiting: Vec<u32> = seen.iter().copied().collect();
-        while let Some(cell) = waiting.pop() {
-            for slot in 0..4 {
-                let point = self.gate_point(graph, cell, slot);
-                let is_near = length(sub(point, centre)) <= reach;
-                if is_near {
-                    closed.close(graph, cell, slot);
-                    let beyond = graph.cell(cell).neighbours[slot];
-                    if seen.insert(beyond) {
-                        waiting.push(beyond);
-                    }
-                }
-            }
-        }
-    }
-
     /// Whether two tunnels have one mouth, or run the same way.
     fn is_same(&self, a: &Tunnel, b: &Tunnel) -> bool {
         length(sub(a.exit(), b.exit())) <= self.params.mouth
@@ -406,7 +328,7 @@ impl<'a> Search<'a> {
     fn with_balls(
         &self,
         count: usize,
-        start: Start,
+        start: Origin,
         lower: f64,
         upper: f64,
         mut searched: Searched,
@@ -436,7 +358,7 @@ impl<'a> Search<'a> {
         &self,
         h: f64,
         mut graph: Graph<'a>,
-        start: Start,
+        start: Origin,
         lower: f64,
         upper: f64,
         mut searched: Searched,
@@ -478,12 +400,7 @@ impl<'a> Search<'a> {
             self.clearance,
         );
         if let Some(tunnel) = tunnel {
-            made.widest = Some(Widest {
-                width: way.width,
-                lower: lower.max(tunnel.narrowest.radius).min(upper),
-                upper,
-                narrowest: tunnel.narrowest.clone(),
-            });
+            made.widest = Some(Widest::along(&tunnel, [lower, upper]));
             if way.width >= self.params.probe_radius {
                 made.tunnels.push(tunnel);
             }
@@ -494,7 +411,7 @@ impl<'a> Search<'a> {
 
 /// Over the radius of the solvent's probe, which sets the unit: ways nearer than this to one another all
 /// along are one.
-const NEAR: f64 = 1.0 / 3.0;
+pub(super) const NEAR: f64 = 1.0 / 3.0;
 
 /// The largest distance of a stop of either tunnel to the nearest of the other.
 pub fn hausdorff(a: &Tunnel, b: &Tunnel) -> f64 {

@@ -9,7 +9,7 @@ use crate::numeric::vector::{length, sub};
 
 /// Where ways start.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Start {
+pub struct Origin {
     /// As asked for.
     pub given: [f64; 3],
     /// The point used.
@@ -27,10 +27,10 @@ pub fn outside(point: [f64; 3]) -> Error {
     Error::Geometry(Fault::whole(problem).with_hint(hint))
 }
 
-impl Start {
+impl Origin {
     /// A start in no triangulation.
     pub fn alone(given: [f64; 3], clearance: f64) -> Self {
-        Start {
+        Origin {
             given,
             used: given,
             clearance,
@@ -46,7 +46,7 @@ impl Start {
         params: &Params,
         outside_cells: &mut Outside,
     ) -> Result<Self, Halt> {
-        let mut start = Start::alone(given, graph.width_at(given));
+        let mut start = Origin::alone(given, graph.width_at(given));
         if params.start_search > 0.0 {
             let mut best: Option<(f64, f64, u32)> = None;
             for cell in 0..graph.triangulation.cells().len() as u32 {
@@ -105,5 +105,51 @@ impl Start {
         let own = self.cell.filter(|cell| graph.is_centre(*cell, self.used));
         let cell = own.or_else(|| graph.triangulation.locate(self.used, None))?;
         Some(cell).filter(|cell| graph.cell(*cell).is_finite())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::tests::{crystal, held, ideal, solve};
+    use super::super::{Exit, Method, Params};
+
+    #[test]
+    fn a_start_narrower_than_every_gate_limits_the_way() {
+        let balls = crystal(&[[0.0; 3]], 7, 6.0, 1.7);
+        // Gates have 6 / sqrt 2 - 1.7 = 2.54; 2 from an atom's centre there is 0.3.
+        let start = [18.0, 18.0, 20.0];
+        let methods = [
+            Method::Conservative,
+            Method::Approximate,
+            Method::Exact,
+            Method::Balls(6),
+        ];
+        for method in methods {
+            let widest = ideal(&balls, start, method);
+            assert!((widest.width - 0.3).abs() < 1e-6, "{method:?}: {widest:?}");
+            assert!(widest.lower <= 0.3 + 1e-12 && widest.upper <= 0.3 + 1e-12);
+            assert!(widest.lower > 0.3 - 1e-6, "{method:?}: {widest:?}");
+            assert_eq!(widest.narrowest.point, start, "{method:?}");
+            let found = solve(&balls, start, &held(method));
+            assert!(
+                widest.lower >= found.start.clearance,
+                "{method:?}: {widest:?}"
+            );
+        }
+        // It does so for ways to the solvent too, and a wider place near does not.
+        let to_shell = Params {
+            exit: Exit::Shell,
+            ..held(Method::Approximate)
+        };
+        let found = solve(&balls, start, &to_shell);
+        let widest = found.widest.expect("a way");
+        assert!((widest.lower - found.start.clearance).abs() < 1e-12);
+        let moved = Params {
+            start_search: 5.0,
+            ..to_shell
+        };
+        let found = solve(&balls, start, &moved);
+        let widest = found.widest.expect("a way");
+        assert!(widest.upper < found.start.clearance - 0.5, "{widest:?}");
     }
 }

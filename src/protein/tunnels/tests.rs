@@ -6,12 +6,12 @@ use crate::numeric::vector::{add, cross, dot, length, normalize, scale, sub};
 use crate::progress::Silent;
 use crate::spatial::delaunay3::Delaunay3;
 
-fn ball(centre: [f64; 3], radius: f64) -> Ball {
+pub(super) fn ball(centre: [f64; 3], radius: f64) -> Ball {
     Ball { centre, radius }
 }
 
 /// The start held, ways to infinity.
-fn held(method: Method) -> Params {
+pub(super) fn held(method: Method) -> Params {
     Params {
         method,
         exit: Exit::Hull,
@@ -22,11 +22,11 @@ fn held(method: Method) -> Params {
     }
 }
 
-fn solve(balls: &[Ball], start: [f64; 3], params: &Params) -> Tunnels {
+pub(super) fn solve(balls: &[Ball], start: [f64; 3], params: &Params) -> Tunnels {
     find(balls, start, params, &Silent).expect("a start inside")
 }
 
-fn ideal(balls: &[Ball], start: [f64; 3], method: Method) -> Widest {
+pub(super) fn ideal(balls: &[Ball], start: [f64; 3], method: Method) -> Widest {
     let found = solve(balls, start, &held(method));
     found.widest.expect("there are cells")
 }
@@ -72,7 +72,7 @@ fn lattices() -> Vec<Lattice> {
     ]
 }
 
-fn crystal(cell: &[[f64; 3]], side: i32, size: f64, radius: f64) -> Vec<Ball> {
+pub(super) fn crystal(cell: &[[f64; 3]], side: i32, size: f64, radius: f64) -> Vec<Ball> {
     let mut balls = Vec::new();
     for index in 0..side.pow(3) {
         let corner = [index % side, index / side % side, index / side / side].map(f64::from);

@@ -241,3 +241,45 @@ fn cost(stops: &[Stop], clearance: &Clearance) -> f64 {
     };
     stops.windows(2).map(piece).sum()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn figures_along_a_way_are_those_of_theory() {
+        let balls = [Ball {
+            centre: [0.0; 3],
+            radius: 1.0,
+        }];
+        let clearance = Clearance::new(&balls);
+        let along = |way: &[[f64; 3]]| {
+            Tunnel::along(way.to_vec(), 1.0, 0.01, &balls, &clearance).expect("a tunnel")
+        };
+        // Straight away from the ball: the integral of 1 / (x - 1)^2 from 2 to 4.
+        let straight = along(&[[2.0, 0.0, 0.0], [4.0, 0.0, 0.0]]);
+        let cost = 2.0 / 3.0;
+        assert!((straight.cost - cost).abs() < 1e-8, "{}", straight.cost);
+        assert!((straight.throughput - f64::exp(-cost)).abs() < 1e-8);
+        assert_eq!((straight.length, straight.curvature), (2.0, 1.0));
+        assert_eq!(straight.narrowest.radius, 1.0);
+        assert_eq!(straight.narrowest.point, [2.0, 0.0, 0.0]);
+        assert_eq!(straight.exit(), [4.0, 0.0, 0.0]);
+        // Around a corner, and past the ball at a distance of 1 from it.
+        let bent = along(&[[2.0, -3.0, 0.0], [2.0, 0.0, 0.0], [6.0, 0.0, 0.0]]);
+        assert!((bent.length - 7.0).abs() < 1e-12);
+        assert!((bent.curvature - 7.0 / 5.0).abs() < 1e-12);
+        assert_eq!(bent.narrowest.point, [2.0, 0.0, 0.0]);
+        let before = along(&[[2.0, -3.0, 0.0], [2.0, 0.0, 0.0]]);
+        let after = along(&[[2.0, 0.0, 0.0], [6.0, 0.0, 0.0]]);
+        assert!((after.cost - 0.8).abs() < 1e-8, "{}", after.cost);
+        assert!((bent.cost - before.cost - after.cost).abs() < 1e-12);
+        assert!((bent.throughput - before.throughput * after.throughput).abs() < 1e-12);
+        // The way back is as hard, and a way to nowhere costs nothing.
+        let back = along(&[[4.0, 0.0, 0.0], [2.0, 0.0, 0.0]]);
+        assert!((back.cost - cost).abs() < 1e-8);
+        let point = along(&[[2.0, 0.0, 0.0]]);
+        assert_eq!((point.cost, point.throughput), (0.0, 1.0));
+        assert_eq!((point.length, point.curvature), (0.0, 1.0));
+    }
+}
