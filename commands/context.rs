@@ -32,7 +32,7 @@ pub struct Files<'a> {
     together: bool,
     output: Option<&'a Output>,
     extras: Vec<(Extra, &'a str)>,
-    labelled: bool,
+    placeholder: Option<&'static str>,
     /// What is read beside the inputs.
     beside: Vec<Reads>,
     /// What is written once, for all inputs: the option, and where.
@@ -56,7 +56,7 @@ impl<'a> Files<'a> {
             together: true,
             output: None,
             extras: Vec::new(),
-            labelled: false,
+            placeholder: None,
             beside: Vec::new(),
             once: Vec::new(),
         }
@@ -76,9 +76,10 @@ impl<'a> Files<'a> {
         self
     }
 
-    /// With several results of one input, one for each label, where the place has `{label}`.
-    pub fn labelled(mut self, labelled: bool) -> Self {
-        self.labelled = labelled;
+    /// With several results of one input, one for each of what a placeholder stands for, where the
+    /// place has it.
+    pub fn several(mut self, placeholder: Option<&'static str>) -> Self {
+        self.placeholder = placeholder;
         self
     }
 
@@ -141,7 +142,7 @@ impl<'a> Files<'a> {
             word,
             asked.map(|format| format.extensions()[0]),
             &self.names(),
-            self.labelled,
+            self.placeholder,
         )?;
         planned
             .into_iter()

@@ -9,8 +9,10 @@ use std::fs;
 use std::io::{Error as IoError, ErrorKind};
 use std::path::{Path, PathBuf};
 
-/// What stands for the label in the place of a result.
-const LABEL: &str = "{label}";
+/// What stands for the number of a frame in the place of a result.
+pub const FRAME: &str = "{frame}";
+/// What stands for a label in the place of a result.
+pub const LABEL: &str = "{label}";
 
 /// Where the result of one input goes.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -124,18 +126,17 @@ impl Target {
         }
     }
 
-    /// It for one label, where there is a file for each.
-    pub fn of_label(&self, label: &str) -> Self {
-        let mut own = self.clone();
+    /// Whether its place has a placeholder, and so a file for each of what it stands for.
+    pub fn is_pattern(&self, placeholder: &str) -> bool {
         let path = self.place.sink.path().display().to_string();
-        own.place.sink = Sink::new(&path.replace(LABEL, label));
-        own
+        path.contains(placeholder)
     }
 
-    /// Whether there is a file for each label.
-    pub fn takes_labels(&self) -> bool {
-        let path = self.place.sink.path().display().to_string();
-        path.contains(LABEL)
+    /// It with its result at another place.
+    pub fn at(&self, path: &Path) -> Self {
+        let mut own = self.clone();
+        own.place.sink = Sink::File(path.to_owned());
+        own
     }
 
     /// The error of a format that cannot be what is asked for, blamed on the option that said it.
@@ -204,11 +205,11 @@ pub fn plan(
     word: &str,
     extension: Option<&str>,
     inputs: &[String],
-    labelled: bool,
+    placeholder: Option<&str>,
 ) -> Result<Vec<Destination>> {
     let wrong = |problem: String| Error::parameter(option, word, problem);
     let is_folder = word.ends_with('/') || Path::new(word).is_dir();
-    check_placeholders(word, labelled).map_err(wrong)?;
+    check_placeholders(word, placeholder).map_err(wrong)?;
     if inputs.len() > 1 && !is_folder && !word.contains("{stem}") {
         return Err(wrong(format!(
             "one place for the results of {} inputs; name a folder (out/) or use {{stem}}",
@@ -239,14 +240,16 @@ pub fn plan(
     Ok(planned)
 }
 
-fn check_placeholders(word: &str, labelled: bool) -> Result<(), String> {
+fn check_placeholders(word: &str, also: Option<&str>) -> Result<(), String> {
     for part in word.split('{').skip(1) {
-        let name = part.split_once('}').map(|(name, _)| name);
-        if name != Some("stem") && !(labelled && name == Some("label")) {
-            let also = if labelled { " and {label}" } else { "" };
+        let name = match part.split_once('}') {
+            Some((name, _)) => format!("{{{name}}}"),
+            None => format!("{{{part}"),
+        };
+        if name != "{stem}" && Some(name.as_str()) != also {
+            let also = also.map_or(String::new(), |also| format!(" and {also}"));
             return Err(format!(
-                "{{{} is no placeholder here; there is {{stem}}{also}",
-                name.map_or(part.to_owned(), |name| format!("{name}}}"))
+                "{name} is no placeholder here; there is {{stem}}{also}"
             ));
         }
     }
@@ -275,7 +278,7 @@ mod tests {
 
     fn paths(word: &str, extension: Option<&str>, inputs: &[&str]) -> Result<Vec<String>> {
         let inputs: Vec<String> = inputs.iter().map(|s| s.to_string()).collect();
-        let planned = plan("output", word, extension, &inputs, false)?;
+        let planned = plan("output", word, extension, &inputs, None)?;
         Ok(planned
             .iter()
             .map(|p| p.sink.path().display().to_string())

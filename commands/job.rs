@@ -23,7 +23,7 @@ use scantle::report::{Input, Output, Report, Run, SCHEMA, Stage, Warning};
 use scantle::volume::Volume;
 use serde::Serialize;
 use serde_json::Value;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 
 /// One job: reads, writes, and keeps what the report will say about that.
@@ -145,6 +145,34 @@ impl<'a> Job<'a> {
         Ok(content)
     }
 
+    /// Reads the next input by a reader of its own, which is given the word, the format where the user says
+    /// so, and the bytes that may be held.
+    pub fn read_as<T>(
+        &mut self,
+        reader: impl FnOnce(&str, Option<Format>, u64) -> Result<(T, Vec<Input>, Vec<Warning>)>,
+    ) -> Result<T> {
+        let word = &self.words[self.opened];
+        self.opened += 1;
+        self.read_beside(|memory| reader(word, self.format, memory))
+    }
+
+    /// Reads what an option names.
+    pub fn read_beside<T>(
+        &mut self,
+        reader: impl FnOnce(u64) -> Result<(T, Vec<Input>, Vec<Warning>)>,
+    ) -> Result<T> {
+        self.recorder.stage("read", 0);
+        let (content, inputs, warnings) = reader(self.context.memory())?;
+        self.read.extend(inputs);
+        self.warn(warnings);
+        Ok(content)
+    }
+
+    /// The words of the inputs.
+    pub fn words(&self) -> &[String] {
+        self.words
+    }
+
     /// Errors when what is about to be made needs more bytes than may be held.
     pub fn expect_room(&self, what: &str, needed: u128) -> Result<()> {
         let limit = self.context.memory();
@@ -174,29 +202,45 @@ impl<'a> Job<'a> {
         self.write_with(|sink, format| io::write_mesh(mesh, sink, format))
     }
 
-    /// Whether the result is a file for each label.
-    pub fn takes_labels(&self) -> bool {
-        self.output.as_ref().is_some_and(Target::takes_labels)
+    /// Whether the result is a file for each of what a placeholder stands for.
+    pub fn is_pattern(&self, placeholder: &str) -> bool {
+        self.output
+            .as_ref()
+            .is_some_and(|target| target.is_pattern(placeholder))
     }
 
-    /// Refuses, before any work, labels whose file would go over what is read, or where something else goes.
-    pub fn expect_labels(&self, labels: impl Iterator<Item = String>) -> Result<()> {
+    /// Where the result goes that is one of several: the placeholder made into a word.
+    fn place_of(&self, placeholder: &str, word: &str) -> Option<PathBuf> {
+        let target = self.output.as_ref()?;
+        let path = target.place.sink.path().display().to_string();
+        Some(path.replace(placeholder, word).into())
+    }
+
+    /// Refuses, before any work, files of one of several results that would go over what is read, or
+    /// where something else goes.
+    pub fn expect_each(
+        &self,
+        placeholder: &str,
+        words: impl Iterator<Item = String>,
+    ) -> Result<()> {
         let (Some(target), Some(taken)) = (&self.output, self.taken) else {
             return Ok(());
         };
-        if !target.takes_labels() {
+        if !target.is_pattern(placeholder) {
             return Ok(());
         }
         let mut taken = taken.lock().expect("no one panics with it");
-        for label in labels {
-            taken.take(&target.of_label(&label).writes())?;
+        for path in words.filter_map(|word| self.place_of(placeholder, &word)) {
+            taken.take(&target.at(&path).writes())?;
         }
         Ok(())
     }
 
-    /// Writes the result of one label, where there is a file for each; see [`Job::expect_labels`].
-    pub fn write_labelled(&mut self, label: &str, mesh: &Mesh) -> Result<()> {
-        let own = self.output.as_ref().map(|all| all.of_label(label));
+    /// Writes the mesh of one label or frame, where there is a file for each; see [`Job::expect_each`].
+    pub fn write_each(&mut self, placeholder: &str, word: &str, mesh: &Mesh) -> Result<()> {
+        let path = self.place_of(placeholder, word);
+        let target = self.output.as_ref().zip(path);
+        let own = target.map(|(target, path)| target.at(&path));
         let all = std::mem::replace(&mut self.output, own);
         let written = self.write_mesh(mesh);
         self.output = all;
@@ -230,6 +274,14 @@ impl<'a> Job<'a> {
     /// Writes the result, if the user wants it.
     pub fn write_animation(&mut self, clip: &Clip) -> Result<()> {
         self.write_with(|sink, format| io::write_animation(clip, sink, format))
+    }
+
+    /// Writes the bytes of the result, which is in the format of its place, if the user wants it.
+    pub fn write_bytes(&mut self, bytes: &[u8]) -> Result<()> {
+        self.write_with(|sink, format| {
+            let output = sink.write(format, |out| out.write_all(bytes))?;
+            Ok((vec![output], Vec::new()))
+        })
     }
 
     fn write_with(

@@ -9,6 +9,7 @@ mod result;
 mod select;
 
 use crate::context::{Context, Files};
+use crate::destination::LABEL;
 use crate::exit::Exit;
 use crate::job::{Found, Job};
 use crate::shared::{Common, Inputs, MaxError, Output, Preview, Verify, list, named};
@@ -177,7 +178,7 @@ pub fn run(args: &Args) -> Result<Exit> {
     params.check()?;
     let files = Files::each(&args.inputs)
         .output(&args.output)
-        .labelled(args.labels.is_some())
+        .several(args.labels.is_some().then_some(LABEL))
         .reads("reference", &args.reference)
         .reads("label-names", &args.label_names)
         .preview(&args.preview);

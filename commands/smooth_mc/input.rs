@@ -2,6 +2,7 @@
 
 use super::select::{self, Inside};
 use super::{Args, output};
+use crate::destination::LABEL;
 use crate::job::Job;
 use scantle::error::{Error, Result, number};
 use scantle::measure::smooth_error::Voxels;
@@ -59,7 +60,7 @@ pub fn of_volume(
     volume.check_numbers().map_err(Error::Geometry)?;
     let what = select::inside(&volume, args)?;
     if let Inside::Labels(values) = &what {
-        job.expect_labels(values.iter().copied().map(number))?;
+        job.expect_each(LABEL, values.iter().copied().map(number))?;
     }
     let one = what.select();
     let dual = params.constraint == Constraint::CellCenter;

@@ -5,6 +5,7 @@ use super::known::Known;
 use super::result::{Body, Stats};
 use super::select::Inside;
 use super::{Args, Asked, beside};
+use crate::destination::LABEL;
 use crate::job::{Found, Job};
 use scantle::error::{Error, Result, number};
 use scantle::image::colour::{CLAY, OKABE_ITO};
@@ -60,11 +61,11 @@ pub fn finish(
         let of = |t: &[u32; 3]| piece.surface.sides_of(t).unwrap_or_default().map(name);
         mesh.sides = Some(triangles.iter().map(of).collect());
     }
-    if job.takes_labels() {
+    if job.is_pattern(LABEL) {
         for (i, body) in bodies.iter().enumerate() {
             let own = piece.surface.triangles_around(i as u16 + 1, &triangles);
             let own = Mesh::from_triangles(mesh.positions.clone(), turned(&own, mirrored));
-            job.write_labelled(&number(body.label), &own.compacted())?;
+            job.write_each(LABEL, &number(body.label), &own.compacted())?;
         }
     } else {
         job.write_mesh(&mesh)?;

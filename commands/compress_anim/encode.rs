@@ -1,0 +1,347 @@
+//! `scantle compress-anim encode`: from an animation to a stream.
+
+use super::picture;
+use super::sources::{self, Sampling};
+use super::{Asked as AnyAsked, Found as AnyFound, NAME};
+use crate::context::{Context, Files};
+use crate::exit::Exit;
+use crate::job::{Found, Job};
+use crate::shared::{Common, Inputs, MaxError, Output, Preview, Verify, named, positive};
+use clap::{ArgGroup, value_parser};
+use scantle::anim::Clip;
+use scantle::anim::compress::{self, Encoder, Ground, Made, Method, Params, Stream, Target};
+use scantle::error::{Error, Result};
+use scantle::io::format::{Format, Kind};
+use scantle::measure::animation_error::{AnimationError, Meter};
+use scantle::report::{Accuracy, Measures, Modelled};
+use schemars::JsonSchema;
+use serde::Serialize;
+
+/// Make a stream of an animation
+///
+/// An animation is a cache of points (PC2, MDD) with a mesh of its faces, a glTF file, or a mesh file
+/// for each frame: a folder, a pattern in quotes ('frame*.obj', 'frame%04d.obj') or several files.
+/// Every stream is decoded again, and the error in the report is that of what came out.
+#[derive(Debug, clap::Args)]
+#[command(after_long_help = AFTER, group = ArgGroup::new("target"))]
+pub struct Args {
+    #[command(flatten)]
+    inputs: Inputs,
+    /// A mesh with the faces of the animation, for caches of points
+    #[arg(long, value_name = "MESH")]
+    base: Option<String>,
+    /// Frames per second: glTF is sampled so often, and other files are said to be played so [default:
+    /// what the file says, else 24]
+    #[arg(long, value_name = "F", value_parser = positive)]
+    fps: Option<f64>,
+    /// The animation of a glTF file, by its name or number [default: the first]
+    #[arg(long, value_name = "NAME")]
+    animation: Option<String>,
+    /// Most error, in percent of frames drawn together to their centroids (Karni and Gotsman)
+    /// [default: 0.1]
+    #[arg(long, value_name = "PERCENT", value_parser = positive, group = "target")]
+    target_kg: Option<f64>,
+    /// Most error, as the root of the mean squared distance of a vertex, in the file's unit
+    #[arg(long, value_name = "X", value_parser = positive, group = "target")]
+    target_rmse: Option<f64>,
+    /// Most distance of any vertex in any frame, in the file's unit
+    #[arg(long, value_name = "X", value_parser = positive, group = "target")]
+    target_max: Option<f64>,
+    /// Most bits per vertex and frame, without those of the faces
+    #[arg(long, value_name = "B", value_parser = positive, group = "target")]
+    target_bpvf: Option<f64>,
+    /// How motion is told: `trajectory`, components of all trajectories with weights over the mesh;
+    /// `delta`, each frame from the one before; `auto`, the shorter of the two
+    #[arg(long, default_value = Params::DEFAULT.method.name(), value_parser = named(Method::NAMES, Method::from_name))]
+    method: Method,
+    /// Frames that are told together, at most: what a range of frames is decoded by
+    #[arg(long, value_name = "N", default_value_t = Params::DEFAULT.window as u16, value_parser = value_parser!(u16).range(1..=1024))]
+    window: u16,
+    /// Report the whole curve of bits and errors too: a stream for each of ten errors from 0.02 to 2 %
+    #[arg(long)]
+    ladder: bool,
+    #[command(flatten)]
+    output: Output,
+    #[command(flatten)]
+    preview: Preview,
+    #[command(flatten)]
+    max_error: MaxError,
+    #[command(flatten)]
+    verify: Verify,
+    #[command(flatten)]
+    common: Common,
+}
+
+const AFTER: &str = "\
+The first measure of `accuracy`, which --max-error checks, is the error of Karni and Gotsman about
+the centroids, in percent; it is always measured on what is decoded, with --verify or without.
+
+Examples:
+  scantle compress-anim encode fixtures/animations/wave.pc2 --base fixtures/animations/wave.obj -o wave.sanim
+  scantle compress-anim encode fixtures/animations/bar-skin.glb --fps 30 --target-max 0.001 -o bar.sanim
+";
+
+/// The errors of the ladder, in percent.
+const LADDER: [f64; 10] = [2.0, 1.0, 0.7, 0.5, 0.3, 0.2, 0.1, 0.07, 0.04, 0.02];
+
+/// What was asked for.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct Asked {
+    /// The mesh with the faces.
+    base: Option<String>,
+    /// Frames per second, where they were given.
+    fps: Option<f64>,
+    /// The animation of a glTF file, where it was named.
+    animation: Option<String>,
+    /// How the motion is told.
+    method: String,
+    /// What decides the accuracy: the name of the option.
+    target: String,
+    /// Its value.
+    target_value: f64,
+    /// Frames that are told together, at most.
+    window: u64,
+}
+
+/// What a stream became.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct Stats {
+    /// Vertices of every frame.
+    vertices: u64,
+    /// Frames.
+    frames: u64,
+    /// Bytes of the stream.
+    bytes: u64,
+    /// Bits per vertex and frame.
+    bpvf: Bpvf,
+    /// What was made on the way.
+    #[serde(flatten)]
+    made: compress::Stats,
+    /// The error of Karni and Gotsman about the centroids that the encoder expected, in percent.
+    predicted_kg_centroid_percent: Option<f64>,
+    /// The errors of what is decoded.
+    error: AnimationError,
+    /// Bits and errors from coarse to fine, with `--ladder`.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    ladder: Vec<Rung>,
+}
+
+/// Bits per vertex and frame.
+#[derive(Debug, Clone, Serialize, JsonSchema)]
+pub struct Bpvf {
+    /// All but the faces.
+    geometry: f64,
+    /// The whole stream. Raw coordinates of four bytes take 96.
+    total: f64,
+    /// By what they tell.
+    by_part: compress::Bits,
+}
+
+/// A stream of the ladder.
+#[derive(Debug, Clone, Serialize, JsonSchema)]
+pub struct Rung {
+    /// The error asked for, in percent.
+    target_kg: f64,
+    /// How the motion is told.
+    method: String,
+    /// Bits per vertex and frame, without the faces.
+    bpvf_geometry: f64,
+    /// Bits per vertex and frame.
+    bpvf_total: f64,
+    /// The error of Karni and Gotsman about the centroids, in percent.
+    kg_centroid_percent: Option<f64>,
+    /// The same about the means over time.
+    kg_mean_percent: Option<f64>,
+    /// Root of the mean squared distance of a vertex.
+    rmse: f64,
+    /// Largest distance.
+    max_error: f64,
+    /// Components of all windows.
+    components: u64,
+}
+
+impl Args {
+    fn target(&self) -> Target {
+        let Args {
+            target_kg,
+            target_rmse,
+            target_max,
+            target_bpvf,
+            ..
+        } = *self;
+        target_kg
+            .map(Target::Kg)
+            .or(target_rmse.map(Target::Rmse))
+            .or(target_max.map(Target::Max))
+            .or(target_bpvf.map(Target::Bpvf))
+            .unwrap_or(Params::DEFAULT.target)
+    }
+
+    fn params(&self) -> Params {
+        Params {
+            method: self.method,
+            target: self.target(),
+            window: usize::from(self.window),
+        }
+    }
+}
+
+/// Makes the stream of each input.
+pub fn run(args: &Args) -> Result<Exit> {
+    let context = Context::new(&args.common)?;
+    let files = match sources::are_frames(&args.inputs.inputs) {
+        true => Files::together(&args.inputs.inputs, &args.inputs.format),
+        false => Files::each(&args.inputs),
+    };
+    let files = files
+        .reads("base", &args.base)
+        .output(&args.output)
+        .preview(&args.preview);
+    context.run(NAME, &files, |job| encode(job, args))
+}
+
+fn encode(job: &mut Job, args: &Args) -> Result<Found<AnyAsked, AnyFound>> {
+    job.expect_output(&[Kind::Animation])?;
+    if let Some(format) = job.output_format().filter(|format| *format != Format::Sanim) {
+        let problem = "is no stream: the result is written as sanim";
+        return Err(Error::parameter("output-format", format.name(), problem));
+    }
+    let sampling = Sampling {
+        rate: args.fps,
+        animation: args.animation.as_deref(),
+    };
+    let clip = sources::read(job, sampling, args.base.as_deref())?;
+    let params = args.params();
+    job.expect_room("coding the animation", compress::room(&clip, &params))?;
+    let ground = Ground::new(&clip.mesh)?;
+    let encoder = Encoder::new(&clip, &ground, &params, job.progress())?;
+    let made = encoder.make(params.target, job.progress())?;
+    job.progress().stage("verify", 0);
+    let error = measured(&clip, &made)?;
+    if let Target::Max(bound) = params.target
+        && error.max_error.distance > bound
+    {
+        let problem = format!(
+            "cannot be reached: coordinates as large as these are rounded by more; {:e} is",
+            error.max_error.distance
+        );
+        return Err(Error::parameter("target-max", bound, problem));
+    }
+    let ladder = if args.ladder { ladder(&clip, &encoder, job)? } else { Vec::new() };
+    job.write_bytes(&made.bytes)?;
+    let summary = summary(&clip, &made, &error);
+    job.write_preview(|_| picture::of_stream(&clip, &made.bytes, &error, &summary));
+    let stats = stats(&clip, &encoder, &made, error, ladder);
+    let (accuracy, modelled) = (accuracy(&stats.error), modelled(&clip, &made));
+    let asked = AnyAsked::Encode(Asked {
+        base: args.base.clone(),
+        fps: args.fps,
+        animation: args.animation.clone(),
+        method: params.method.name().to_owned(),
+        target: params.target.option().to_owned(),
+        target_value: params.target.value(),
+        window: params.window as u64,
+    });
+    Ok(Found::new(asked, AnyFound::Encode(Box::new(stats)), summary)
+        .accuracy(accuracy)
+        .modelled(modelled)
+        .check("max-error", args.max_error.max_error))
+}
+
+/// The error of what a stream decodes to.
+fn measured(clip: &Clip, made: &Made) -> Result<AnimationError> {
+    let stream = Stream::open(&made.bytes, None).map_err(Error::Geometry)?;
+    let mut meter = Meter::new(clip, 0);
+    let frames = 0..clip.frames();
+    stream.each_frame(frames, |_, frame| meter.frame(frame)).map_err(Error::Geometry)?;
+    Ok(meter.finish())
+}
+
+fn bpvf(clip: &Clip, made: &Made) -> Bpvf {
+    let positions = (clip.vertices() * clip.frames()) as f64;
+    let bits = made.stats.bits;
+    Bpvf {
+        geometry: (bits.total - bits.faces) / positions,
+        total: bits.total / positions,
+        by_part: bits.scaled(1.0 / positions),
+    }
+}
+
+fn ladder(clip: &Clip, encoder: &Encoder, job: &Job) -> Result<Vec<Rung>> {
+    let rung = |target_kg: f64| {
+        let made = encoder.make(Target::Kg(target_kg), job.progress())?;
+        let (error, bpvf) = (measured(clip, &made)?, bpvf(clip, &made));
+        Ok(Rung {
+            target_kg,
+            method: made.stats.method,
+            bpvf_geometry: bpvf.geometry,
+            bpvf_total: bpvf.total,
+            kg_centroid_percent: error.kg_centroid_percent,
+            kg_mean_percent: error.kg_mean_percent,
+            rmse: error.rmse,
+            max_error: error.max_error.distance,
+            components: made.stats.components.iter().sum(),
+        })
+    };
+    LADDER.into_iter().map(rung).collect()
+}
+
+fn stats(
+    clip: &Clip,
+    encoder: &Encoder,
+    made: &Made,
+    error: AnimationError,
+    ladder: Vec<Rung>,
+) -> Stats {
+    let norm = encoder.norm();
+    let predicted = made.stats.predicted_squared_error;
+    Stats {
+        vertices: clip.vertices() as u64,
+        frames: clip.frames() as u64,
+        bytes: made.bytes.len() as u64,
+        bpvf: bpvf(clip, made),
+        made: made.stats.clone(),
+        predicted_kg_centroid_percent: (norm > 0.0).then(|| 100.0 * (predicted / norm).sqrt()),
+        error,
+        ladder,
+    }
+}
+
+fn summary(clip: &Clip, made: &Made, error: &AnimationError) -> String {
+    let bpvf = bpvf(clip, made);
+    let kg = error.kg_centroid_percent;
+    let kg = kg.map_or("no share".to_owned(), |kg| format!("{kg:.4} %"));
+    format!(
+        "{} frames of {} vertices in {} bytes: {:.3} bits per vertex and frame, {:.3} with the faces, error {kg}",
+        clip.frames(),
+        clip.vertices(),
+        made.bytes.len(),
+        bpvf.geometry,
+        bpvf.total
+    )
+}
+
+/// The errors of an animation as measures; the first compares all settings.
+pub fn accuracy(error: &AnimationError) -> Measures {
+    let measure = |measure: &str, unit: &str, reached| Accuracy {
+        measure: measure.to_owned(),
+        unit: unit.to_owned(),
+        bound: None,
+        reached,
+        reference: compress::TRADE.reference.to_owned(),
+        verified: true,
+    };
+    let first = compress::TRADE.error;
+    Measures::Many(vec![
+        measure(first.name, first.unit, error.kg_centroid_percent),
+        measure("error about the means", "percent", error.kg_mean_percent),
+        measure("root mean square distance", "file unit", Some(error.rmse)),
+        measure("largest distance", "file unit", Some(error.max_error.distance)),
+    ])
+}
+
+/// How much of the coordinates was told.
+fn modelled(clip: &Clip, made: &Made) -> Modelled {
+    let full = (3 * clip.vertices() * clip.frames()) as u64;
+    Modelled::new("numbers", made.stats.numbers, full, made.bytes.len() as u64)
+}
