@@ -250,7 +250,8 @@ impl<'a> Context<'a> {
         let mut worst = Exit::Done;
         for ((index, inputs), extras) in jobs.iter().enumerate().zip(extras) {
             let output = outputs.as_ref().map(|all| all[index].clone());
-            let mut job = Job::new(self, inputs, files.format, start.get(), with_bar);
+            let job = Job::new(self, inputs, files.format, start.get(), with_bar);
+            let mut job = job.among_others(jobs.len() > 1);
             job.send_to(output, extras, &taken);
             let found = self.pool.install(|| work(&mut job));
             worst = worst.max(match found {

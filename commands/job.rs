@@ -41,6 +41,7 @@ pub struct Job<'a> {
     warnings: Vec<Warning>,
     opened: usize,
     taken: Option<&'a Mutex<Taken>>,
+    is_alone: bool,
 }
 
 impl<'a> Job<'a> {
@@ -64,7 +65,14 @@ impl<'a> Job<'a> {
             warnings: Vec::new(),
             opened: 0,
             taken: None,
+            is_alone: true,
         }
+    }
+
+    /// One of several, so that what it says names its input.
+    pub(crate) fn among_others(mut self, several: bool) -> Self {
+        self.is_alone = !several;
+        self
     }
 
     /// Where it writes; `taken` are the places of all jobs.
@@ -413,7 +421,9 @@ impl<'a> Job<'a> {
             },
             other => other,
         };
-        complain(&error, Some(file))
+        // An option is wrong for the run as a whole, where there is one input.
+        let is_alone = self.is_alone && matches!(error, Error::Parameter { .. });
+        complain(&error, Some(&**file).filter(|_| !is_alone))
     }
 
     fn tell(&self, summary: &str, stages: &[Stage]) {

@@ -75,7 +75,9 @@ pub fn complain(error: &Error, about: Option<&str>) -> Exit {
         return exit;
     }
     match (error, about) {
-        (Error::Limit { .. }, Some(file)) => say(format_args!("{file}: {error}")),
+        (Error::Limit { .. } | Error::Parameter { .. }, Some(file)) => {
+            say(format_args!("{file}: {error}"))
+        }
         _ => say(error),
     }
     if let Some(hint) = error.hint() {

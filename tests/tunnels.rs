@@ -207,6 +207,50 @@ fn a_way_that_its_start_limits_is_told() {
     assert!(!limited(MIDDLE));
     // 0.3 from the surface of an atom at (4.2, 8.4, 8.4).
     assert!(limited("--start 6.2,8.4,8.4 --start-search 0"));
+    // What is closed for that alone has a way out.
+    for (words, is_told) in [
+        ("--start 6.2,8.4,8.4 --start-search 0", true),
+        ("--start 10.5,10.5,10.5 --probe-radius 2", false),
+    ] {
+        let ran = place.run(&format!("tunnels a.pdb {words}"));
+        assert_eq!(ran.code, 0, "{}", ran.stderr);
+        assert!(
+            ran.stderr.contains(": no way out is as wide as"),
+            "{}",
+            ran.stderr
+        );
+        let hint = "a larger --start-search may find a wider place";
+        assert_eq!(ran.stderr.contains(hint), is_told, "{}", ran.stderr);
+    }
+}
+
+#[test]
+fn of_several_inputs_the_one_that_lacks_the_start_is_named() {
+    let place = Workplace::new();
+    place.put("a.pdb", crystal());
+    place.put("b.pdb", first_lines(&crystal(), 188));
+    let lacks = "--start-atoms 0,215: no atom 215: the numbers are 0 to 195";
+    let ran = place.run("tunnels a.pdb b.pdb --start-atoms 0,215 -q");
+    assert_eq!(ran.code, 2, "{}", ran.stderr);
+    assert!(
+        ran.stderr.starts_with(&format!("scantle: b.pdb: {lacks}")),
+        "{}",
+        ran.stderr
+    );
+    assert_eq!(ran.documents().len(), 1);
+    let ran = place.run("tunnels b.pdb --start-atoms 0,215");
+    assert!(
+        ran.stderr.starts_with(&format!("scantle: {lacks}")),
+        "{}",
+        ran.stderr
+    );
+    // A chain without a name cannot be named.
+    let unnamed = crystal().replace("ALA A", "ALA  ");
+    place.put("c.pdb", unnamed);
+    let ran = place.run("tunnels c.pdb --start-residues A:1");
+    let why = "no residue A:1: the only chain has no name; give the number alone, as in 1";
+    assert!(ran.stderr.contains(why), "{}", ran.stderr);
+    assert_eq!(ran.code, 2);
 }
 
 #[test]

@@ -267,7 +267,7 @@ impl Solved {
                 given: start.given,
                 used: start.used,
                 clearance: start.clearance,
-                limited: widest.is_some_and(|w| w.lower >= start.clearance),
+                limited: is_limited(model),
             }),
             widest: widest.map(|w| {
                 let own = names.bottleneck(&w.narrowest, w.width, upper);
@@ -288,6 +288,15 @@ impl Solved {
             },
         }
     }
+}
+
+/// Whether the start is the narrowest place of the widest way.
+fn is_limited(model: &Model) -> bool {
+    let lower = model.widest.as_ref().map(|widest| widest.lower);
+    let clearance = model.start.map(|start| start.clearance);
+    lower
+        .zip(clearance)
+        .is_some_and(|(lower, clearance)| lower >= clearance)
 }
 
 /// A few words for a person.
@@ -326,10 +335,13 @@ pub fn warnings(found: &Model, params: &Params) -> Vec<Warning> {
             None,
         )),
         Some(w) if found.tunnels.is_empty() => {
-            let message = format!(
+            let mut message = format!(
                 "no way out is as wide as --probe-radius {}: the widest has {:.4}",
                 params.probe_radius, w.width
             );
+            if is_limited(found) {
+                message += ", and so has its start; a larger --start-search may find a wider place";
+            }
             warnings.push(Warning::new("closed", message, 1, None));
         }
         _ => {}

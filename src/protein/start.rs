@@ -258,7 +258,13 @@ fn no_residue(molecule: &Molecule, model: usize, id: &ResidueId) -> String {
         (Some(least), Some(most)) => format!("no residue {id}: {which} has {least} to {most}"),
         _ => {
             let names: Vec<String> = chains.iter().map(|chain| format!("{chain:?}")).collect();
-            format!("no residue {id}: the chains are {}", names.join(", "))
+            match &chains[..] {
+                [only] if only.is_empty() => format!(
+                    "no residue {id}: the only chain has no name; give the number alone, as in {}",
+                    id.number
+                ),
+                _ => format!("no residue {id}: the chains are {}", names.join(", ")),
+            }
         }
     }
 }
