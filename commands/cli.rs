@@ -4,8 +4,8 @@ use crate::exit::Exit;
 use crate::streams::say;
 use crate::trade::{Declared, TABLE};
 use crate::{
-    compare, completions, convert, formats, info, isosurface, man, schema, shadow, smooth_mc,
-    stability, tradeoff, tunnels, voxelize,
+    compare, completions, compress_anim, convert, formats, info, isosurface, man, schema, shadow,
+    smooth_mc, stability, tradeoff, tunnels, voxelize,
 };
 use clap::error::ErrorKind;
 use clap::{Arg, CommandFactory, FromArgMatches, Parser, Subcommand};
@@ -31,6 +31,7 @@ pub enum Command {
     SmoothMc(Box<smooth_mc::Args>),
     Isosurface(isosurface::Args),
     Tunnels(Box<tunnels::Args>),
+    CompressAnim(compress_anim::Args),
     Info(info::Args),
     Compare(compare::Args),
     Convert(convert::Args),
@@ -48,6 +49,7 @@ const GROUPS: &[(&str, &[&str])] = &[
     ("Mesh to picture", &["shadow"]),
     ("Volume to mesh", &["smooth-mc", "isosurface"]),
     ("Molecules", &["tunnels"]),
+    ("Animations", &["compress-anim"]),
     ("Any file", &["info", "convert", "compare"]),
     ("Any command", &["tradeoff", "stability"]),
     (
@@ -70,13 +72,23 @@ Exit codes:
 pub fn command() -> clap::Command {
     let command = Cli::command()
         .mut_subcommand("convert", |c| c.mut_arg("output", |arg| arg.required(true)))
-        .mut_subcommands(|c| c.mut_args(take_negative_numbers));
+        .mut_subcommands(|c| {
+            c.mut_args(take_negative_numbers)
+                .mut_subcommands(|c| c.mut_args(take_negative_numbers))
+        });
     let command = TABLE.iter().fold(command, |command, (name, declared)| {
-        if command.find_subcommand(name).is_none() {
+        let (first, verb) = match name.split_once(' ') {
+            Some((first, verb)) => (first, Some(verb)),
+            None => (*name, None),
+        };
+        if command.find_subcommand(first).is_none() {
             // `help` is added by building.
             return command;
         }
-        command.mut_subcommand(name, |c| with_trade(c, declared))
+        command.mut_subcommand(first, |c| match verb {
+            Some(verb) => c.mut_subcommand(verb, |c| with_trade(c, declared)),
+            None => with_trade(c, declared),
+        })
     });
     // Building adds the command `help`, which the list shows too.
     let mut built = command.clone();
@@ -86,6 +98,12 @@ pub fn command() -> clap::Command {
         grouped(&built)
     );
     command.help_template(template)
+}
+
+/// The definition of a command, or of a verb of one: `compress-anim encode`.
+pub fn find<'a>(command: &'a clap::Command, name: &str) -> Option<&'a clap::Command> {
+    name.split(' ')
+        .try_fold(command, |command, name| command.find_subcommand(name))
 }
 
 /// A command whose long help says at the end what it trades for what.

@@ -72,7 +72,7 @@ impl Extra {
             word,
             self.formats.first().copied(),
             inputs,
-            false,
+            None,
         )?;
         let beside = |place: Destination| {
             let format = self.format_of(place.sink.path()).ok_or_else(|| {

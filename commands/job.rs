@@ -159,9 +159,10 @@ impl<'a> Job<'a> {
         &mut self,
         reader: impl FnOnce(&str, Option<Format>, u64) -> Result<(T, Vec<Input>, Vec<Warning>)>,
     ) -> Result<T> {
-        let word = &self.words[self.opened];
+        let (words, format) = (self.words, self.format);
+        let word = &words[self.opened];
         self.opened += 1;
-        self.read_beside(|memory| reader(word, self.format, memory))
+        self.read_beside(|memory| reader(word, format, memory))
     }
 
     /// Reads what an option names.

@@ -23,6 +23,7 @@ mod wrapped;
 
 mod compare;
 mod completions;
+mod compress_anim;
 mod convert;
 mod formats;
 mod info;
@@ -55,6 +56,7 @@ fn run(command: &Command) -> Exit {
         Command::SmoothMc(args) => smooth_mc::run(args),
         Command::Isosurface(args) => isosurface::run(args),
         Command::Tunnels(args) => tunnels::run(args),
+        Command::CompressAnim(args) => compress_anim::run(args),
         Command::Info(args) => info::run(args),
         Command::Compare(args) => compare::run(args),
         Command::Convert(args) => convert::run(args),

@@ -3,8 +3,8 @@
 use crate::exit::Exit;
 use crate::streams::print;
 use crate::{
-    compare, convert, formats, info, isosurface, shadow, smooth_mc, stability, tradeoff, tunnels,
-    voxelize, words,
+    compare, compress_anim, convert, formats, info, isosurface, shadow, smooth_mc, stability,
+    tradeoff, tunnels, voxelize, words,
 };
 use clap::builder::PossibleValuesParser;
 use scantle::error::Result;
@@ -33,6 +33,7 @@ type Row = (&'static str, fn() -> Schema);
 /// The schema of every command that prints JSON.
 const SCHEMAS: &[Row] = &[
     ("compare", || schema_for!(compare::Report)),
+    ("compress-anim", || schema_for!(compress_anim::Report)),
     ("convert", || schema_for!(convert::Report)),
     ("formats", || schema_for!(formats::Table)),
     ("info", || schema_for!(info::Report)),

@@ -27,18 +27,26 @@ const TAKEN: &[&str] = &[
 ];
 
 impl Wrapped {
-    /// Takes the words of a command apart. Errs with what to say to the user.
+    /// Takes the words of a command apart, the first of which may be its verb. Errs with what to say to
+    /// the user.
     pub fn new(name: &str, words: &[String]) -> Result<Self, String> {
-        let trade = trade::of(name)?;
         let all = cli::command();
-        let full = ["scantle", name].into_iter();
+        let verb = words.first().map(|verb| format!("{name} {verb}"));
+        let verb = verb.filter(|verb| cli::find(&all, verb).is_some());
+        let (name, words) = match &verb {
+            Some(verb) => (verb.as_str(), &words[1..]),
+            None => (name, words),
+        };
+        let trade = trade::of(name)?;
+        let full = std::iter::once("scantle").chain(name.split(' '));
         let matches = all
             .clone()
             .try_get_matches_from(full.chain(words.iter().map(String::as_str)))
             .map_err(|error| cli::message(&error))?;
-        let (Some(definition), Some((_, matches))) =
-            (all.find_subcommand(name), matches.subcommand())
-        else {
+        let matches = name.split(' ').try_fold(&matches, |matches, _| {
+            matches.subcommand().map(|(_, matches)| matches)
+        });
+        let (Some(definition), Some(matches)) = (cli::find(&all, name), matches) else {
             return Err(format!("there is no command {name}"));
         };
         let mut wrapped = Wrapped {
@@ -151,7 +159,7 @@ impl Wrapped {
                 Some(value) => vec![format!("--{name}"), value],
                 None => vec![format!("--{name}")],
             });
-        let name = std::iter::once(self.name.clone());
+        let name = self.name.split(' ').map(str::to_owned);
         let inputs = inputs.iter().cloned();
         if inputs.clone().any(|input| input.starts_with('-')) {
             let dashes = std::iter::once("--".to_owned());

@@ -49,10 +49,19 @@ pub struct Frames {
 }
 
 fn frames(text: &str) -> Result<Frames, String> {
-    let (from, to) = text.split_once(':').ok_or("not two numbers with a colon between them")?;
-    let number = |text: &str| text.parse::<usize>().map_err(|_| format!("`{text}` is no number"));
+    let (from, to) = text
+        .split_once(':')
+        .ok_or("not two numbers with a colon between them")?;
+    let number = |text: &str| {
+        text.parse::<usize>()
+            .map_err(|_| format!("`{text}` is no number"))
+    };
     let from = if from.is_empty() { 0 } else { number(from)? };
-    let to = if to.is_empty() { None } else { Some(number(to)?) };
+    let to = if to.is_empty() {
+        None
+    } else {
+        Some(number(to)?)
+    };
     match to {
         Some(to) if to <= from => Err(format!("there is no frame from {from} on and before {to}")),
         _ => Ok(Frames { from, to }),
@@ -82,7 +91,9 @@ pub struct Stats {
 /// Decodes each stream.
 pub fn run(args: &Args) -> Result<Exit> {
     let context = Context::new(&args.common)?;
-    let files = Files::each(&args.inputs).output(&args.output).several(Some(FRAME));
+    let files = Files::each(&args.inputs)
+        .output(&args.output)
+        .several(Some(FRAME));
     context.run(NAME, &files, |job| decode(job, args))
 }
 
@@ -98,14 +109,19 @@ fn decode(job: &mut Job, args: &Args) -> Result<Found<AnyAsked, AnyFound>> {
     let asked = args.frames.unwrap_or(Frames { from: 0, to: None });
     let range = asked.from..asked.to.unwrap_or(all);
     let count = range.len();
-    job.expect_room("decoding the stream", compress::room_to_decode(&told, count))?;
+    job.expect_room(
+        "decoding the stream",
+        compress::room_to_decode(&told, count),
+    )?;
     if job.is_pattern(FRAME) {
         job.expect_each(FRAME, range.clone().map(|f| padded(f, all)))?;
     }
     job.progress().stage("decode", 0);
     let stream = Stream::open(&bytes, Some(range.clone())).map_err(|f| malformed(&word, f))?;
     job.warn(sources::cut(&stream));
-    let clip = stream.clip(range.clone()).map_err(|f| malformed(&word, f))?;
+    let clip = stream
+        .clip(range.clone())
+        .map_err(|f| malformed(&word, f))?;
     write(job, &clip, &range, all)?;
     let stats = Stats {
         vertices: clip.vertices() as u64,
@@ -117,8 +133,14 @@ fn decode(job: &mut Job, args: &Args) -> Result<Found<AnyAsked, AnyFound>> {
     let asked = AnyAsked::Decode(Asked {
         frames: [range.start as u64, range.end as u64],
     });
-    let windows = range.end.div_ceil(told.windows[1] as usize) - range.start / told.windows[1] as usize;
-    let modelled = Modelled::new("windows", windows as u64, told.windows[0], bytes.len() as u64);
+    let windows =
+        range.end.div_ceil(told.windows[1] as usize) - range.start / told.windows[1] as usize;
+    let modelled = Modelled::new(
+        "windows",
+        windows as u64,
+        told.windows[0],
+        bytes.len() as u64,
+    );
     Ok(Found::new(asked, AnyFound::Decode(stats), summary).modelled(modelled))
 }
 

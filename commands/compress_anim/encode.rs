@@ -202,7 +202,10 @@ pub fn run(args: &Args) -> Result<Exit> {
 
 fn encode(job: &mut Job, args: &Args) -> Result<Found<AnyAsked, AnyFound>> {
     job.expect_output(&[Kind::Animation])?;
-    if let Some(format) = job.output_format().filter(|format| *format != Format::Sanim) {
+    if let Some(format) = job
+        .output_format()
+        .filter(|format| *format != Format::Sanim)
+    {
         let problem = "is no stream: the result is written as sanim";
         return Err(Error::parameter("output-format", format.name(), problem));
     }
@@ -227,7 +230,11 @@ fn encode(job: &mut Job, args: &Args) -> Result<Found<AnyAsked, AnyFound>> {
         );
         return Err(Error::parameter("target-max", bound, problem));
     }
-    let ladder = if args.ladder { ladder(&clip, &encoder, job)? } else { Vec::new() };
+    let ladder = if args.ladder {
+        ladder(&clip, &encoder, job)?
+    } else {
+        Vec::new()
+    };
     job.write_bytes(&made.bytes)?;
     let summary = summary(&clip, &made, &error);
     job.write_preview(|_| picture::of_stream(&clip, &made.bytes, &error, &summary));
@@ -242,10 +249,12 @@ fn encode(job: &mut Job, args: &Args) -> Result<Found<AnyAsked, AnyFound>> {
         target_value: params.target.value(),
         window: params.window as u64,
     });
-    Ok(Found::new(asked, AnyFound::Encode(Box::new(stats)), summary)
-        .accuracy(accuracy)
-        .modelled(modelled)
-        .check("max-error", args.max_error.max_error))
+    Ok(
+        Found::new(asked, AnyFound::Encode(Box::new(stats)), summary)
+            .accuracy(accuracy)
+            .modelled(modelled)
+            .check("max-error", args.max_error.max_error),
+    )
 }
 
 /// The error of what a stream decodes to.
@@ -253,7 +262,9 @@ fn measured(clip: &Clip, made: &Made) -> Result<AnimationError> {
     let stream = Stream::open(&made.bytes, None).map_err(Error::Geometry)?;
     let mut meter = Meter::new(clip, 0);
     let frames = 0..clip.frames();
-    stream.each_frame(frames, |_, frame| meter.frame(frame)).map_err(Error::Geometry)?;
+    stream
+        .each_frame(frames, |_, frame| meter.frame(frame))
+        .map_err(Error::Geometry)?;
     Ok(meter.finish())
 }
 
@@ -336,7 +347,11 @@ pub fn accuracy(error: &AnimationError) -> Measures {
         measure(first.name, first.unit, error.kg_centroid_percent),
         measure("error about the means", "percent", error.kg_mean_percent),
         measure("root mean square distance", "file unit", Some(error.rmse)),
-        measure("largest distance", "file unit", Some(error.max_error.distance)),
+        measure(
+            "largest distance",
+            "file unit",
+            Some(error.max_error.distance),
+        ),
     ])
 }
 

@@ -47,5 +47,9 @@ fn info(job: &mut Job) -> Result<Found<AnyAsked, AnyFound>> {
     if let Some(at) = told.cut_off_at {
         text += &format!(", cut off at byte {at}");
     }
-    Ok(Found::new(AnyAsked::Info {}, AnyFound::Info(Box::new(told)), text))
+    Ok(Found::new(
+        AnyAsked::Info {},
+        AnyFound::Info(Box::new(told)),
+        text,
+    ))
 }

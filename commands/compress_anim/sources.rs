@@ -26,7 +26,9 @@ type Read = Result<(Clip, Vec<Input>, Vec<Warning>)>;
 /// Whether words are the frames of one animation, one mesh each.
 pub fn are_frames(words: &[String]) -> bool {
     let is_mesh = |word: &String| {
-        let extension = PathBuf::from(word).extension().map(|e| e.to_ascii_lowercase());
+        let extension = PathBuf::from(word)
+            .extension()
+            .map(|e| e.to_ascii_lowercase());
         let format = extension.and_then(|e| Format::from_extension(e.to_str()?));
         format.is_some_and(|f| f.kind() == Kind::Mesh && !matches!(f, Format::Gltf | Format::Glb))
     };
@@ -39,7 +41,7 @@ pub fn read(job: &mut Job, sampling: Sampling, base: Option<&str>) -> Result<Cli
         let paths: Vec<PathBuf> = job.words().iter().map(PathBuf::from).collect();
         job.read_beside(|memory| sequence::read(&paths, None, sampling.rate(), memory))?
     } else {
-        job.read_as(|word, format, memory| animation(word, format, sampling, memory))?
+        read_one(job, sampling)?
     };
     let Some(path) = base else {
         return Ok(clip);
@@ -91,6 +93,11 @@ fn animation(word: &str, format: Option<Format>, sampling: Sampling, memory: u64
         clip.rate = rate;
     }
     Ok((clip, vec![input], warnings))
+}
+
+/// Reads the next of several inputs, each of which is an animation of its own.
+pub fn read_one(job: &mut Job, sampling: Sampling) -> Result<Clip> {
+    job.read_as(|word, format, memory| animation(word, format, sampling, memory))
 }
 
 /// Reads the next input as the bytes of a stream.

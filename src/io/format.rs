@@ -94,6 +94,8 @@ pub enum Format {
     Pc2,
     /// MDD, a cache of points.
     Mdd,
+    /// scantle's stream of an animation.
+    Sanim,
     /// JSON and JSON Lines.
     Json,
 }
@@ -304,6 +306,13 @@ const TABLE: &[Row] = &[
         "MDD: positions of points, frame by frame, with the time of each",
     ),
     row(
+        Format::Sanim,
+        &["sanim"],
+        Kind::Animation,
+        (true, true),
+        "scantle's stream of an animation, made by `compress-anim encode`",
+    ),
+    row(
         Format::Json,
         &["json", "jsonl"],
         Kind::Report,
@@ -451,6 +460,9 @@ pub fn sniff(bytes: &[u8], extension: Option<&str>) -> Result<Format, Fault> {
     }
     if bytes.starts_with(super::pc2::MAGIC) {
         return Ok(Format::Pc2);
+    }
+    if crate::anim::compress::is_stream(bytes) {
+        return Ok(Format::Sanim);
     }
     if super::nifti::is_header(bytes) {
         return Ok(Format::Nifti);

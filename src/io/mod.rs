@@ -32,6 +32,7 @@ mod pointcache;
 pub mod pqr;
 pub mod refusal;
 mod samples;
+mod sanim;
 pub mod sequence;
 pub mod sink;
 pub mod source;
@@ -162,6 +163,7 @@ fn parse(source: &Source, format: Format, warnings: &mut Vec<Warning>) -> Result
         Format::SpheresCsv => Content::Molecule(xyzr::read_csv(source, warnings)?),
         Format::Pc2 => Content::Animation(pc2::read(source, warnings)?),
         Format::Mdd => Content::Animation(mdd::read(source, warnings)?),
+        Format::Sanim => Content::Animation(sanim::read(source, warnings)?),
         Format::Json => Content::Report(json::read(source, warnings)?),
         Format::Vdb => return Err(Fault::whole("vdb files are written, not read").into()),
     };
@@ -366,6 +368,10 @@ pub fn write_animation(
         Format::Pc2 => pc2::write,
         Format::Mdd => mdd::write,
         Format::Glb => gltf::write_clip,
+        Format::Sanim => {
+            let problem = "is made by `compress-anim encode`, to an error that is asked for";
+            return Err(Error::parameter("output-format", format.name(), problem));
+        }
         _ => return Err(cannot_hold(format, Kind::Animation)),
     };
     let output = sink.write(format, |out| writer(clip, out))?;

@@ -4,6 +4,7 @@
 //! itself where it is written or weighed, the bit of the stream where it is read. So there is one
 //! description of every part of a stream, not two that must agree.
 
+use crate::error::Fault;
 use constriction::stream::model::{DecoderModel, EncoderModel, EntropyModel};
 use constriction::stream::queue::{DefaultRangeDecoder, DefaultRangeEncoder};
 use constriction::stream::{Decode, Encode};
@@ -99,7 +100,10 @@ impl Writer {
             Err(never) => match never {},
         };
         let mut bytes: Vec<u8> = words.iter().flat_map(|word| word.to_be_bytes()).collect();
-        let kept = bytes.iter().rposition(|byte| *byte != 0).map_or(0, |last| last + 1);
+        let kept = bytes
+            .iter()
+            .rposition(|byte| *byte != 0)
+            .map_or(0, |last| last + 1);
         bytes.truncate(kept);
         bytes
     }
@@ -167,9 +171,14 @@ impl Reader {
         }
     }
 
-    /// Whether bits were met that no writer makes.
-    pub fn is_broken(&self) -> bool {
-        self.broken
+    /// Errs where bits were met that no writer makes.
+    pub fn check(&self) -> Result<(), Fault> {
+        match self.broken {
+            true => Err(Fault::whole(
+                "a section has bits that no encoder makes; damaged",
+            )),
+            false => Ok(()),
+        }
     }
 }
 
@@ -208,7 +217,7 @@ mod tests {
         for (one, bit) in &made {
             assert_eq!(reader.bit(*one, false), *bit);
         }
-        assert!(!reader.is_broken());
+        assert!(reader.check().is_ok());
         let ideal: f64 = made
             .iter()
             .map(|(one, bit)| {
@@ -217,7 +226,10 @@ mod tests {
             })
             .sum();
         let bits = 8.0 * bytes.len() as f64;
-        assert!(bits >= ideal - 1.0 && bits <= ideal * 1.001 + 64.0, "{bits} for {ideal}");
+        assert!(
+            bits >= ideal - 1.0 && bits <= ideal * 1.001 + 64.0,
+            "{bits} for {ideal}"
+        );
     }
 
     #[test]

@@ -86,7 +86,9 @@ pub struct Sections<'a> {
 /// CRC-8 of a few bytes.
 fn crc8(bytes: &[u8]) -> u8 {
     bytes.iter().fold(0, |crc, byte| {
-        (0..8).fold(crc ^ byte, |crc, _| crc << 1 ^ if crc & 0x80 != 0 { 0x07 } else { 0 })
+        (0..8).fold(crc ^ byte, |crc, _| {
+            crc << 1 ^ if crc & 0x80 != 0 { 0x07 } else { 0 }
+        })
     })
 }
 
@@ -163,7 +165,9 @@ fn head(bytes: &[u8], at: usize, number: usize) -> Result<Option<(Kind, Range<us
     let Some(length) = take_number(&mut rest) else {
         return match rest.is_empty() {
             true => Ok(None),
-            false => damaged(format!("section {number}: its length does not end; damaged")),
+            false => damaged(format!(
+                "section {number}: its length does not end; damaged"
+            )),
         };
     };
     let from = bytes.len() - rest.len();
@@ -171,7 +175,9 @@ fn head(bytes: &[u8], at: usize, number: usize) -> Result<Option<(Kind, Range<us
         return Ok(None);
     };
     if crc8(&bytes[at..from]) != *check {
-        return damaged(format!("section {number}: the checksum of its head is wrong; damaged"));
+        return damaged(format!(
+            "section {number}: the checksum of its head is wrong; damaged"
+        ));
     }
     let Some(kind) = Kind::ALL.get(usize::from(*kind)) else {
         return damaged(format!(
@@ -179,7 +185,9 @@ fn head(bytes: &[u8], at: usize, number: usize) -> Result<Option<(Kind, Range<us
         ));
     };
     let from = from + 1;
-    let to = usize::try_from(length).ok().and_then(|length| from.checked_add(length));
+    let to = usize::try_from(length)
+        .ok()
+        .and_then(|length| from.checked_add(length));
     Ok(to.map(|to| (*kind, from..to)))
 }
 
@@ -189,12 +197,16 @@ fn head(bytes: &[u8], at: usize, number: usize) -> Result<Option<(Kind, Range<us
 /// section where a checksum is wrong, and where the version is a later one. Cost: one pass.
 pub fn parse(bytes: &[u8]) -> Result<Sections<'_>, Fault> {
     if !bytes.starts_with(MAGIC) {
-        return Err(Fault::byte(0, "is no stream of an animation: it does not begin with SANIM"));
+        return Err(Fault::byte(
+            0,
+            "is no stream of an animation: it does not begin with SANIM",
+        ));
     }
     match bytes.get(MAGIC.len()) {
         Some(version) if (1..=VERSION).contains(version) => {}
         Some(version) => {
-            let problem = format!("is of version {version}, but only versions 1 to {VERSION} are known");
+            let problem =
+                format!("is of version {version}, but only versions 1 to {VERSION} are known");
             return Err(Fault::byte(MAGIC.len(), problem));
         }
         None => return Err(Fault::byte(MAGIC.len(), "ends before its version")),

@@ -103,7 +103,9 @@ impl Encoder {
     pub fn frame(&mut self, decoded: &mut [Vec3], given: &[Vec3]) {
         // A little below the bound, so that rounding of coordinates does not pass it.
         let bound = self.bound * (1.0 - 1e-6);
-        self.count += self.state.frame(&mut self.writer, decoded, Some((given, bound)));
+        self.count += self
+            .state
+            .frame(&mut self.writer, decoded, Some((given, bound)));
     }
 
     /// Bits spent up to now.
@@ -154,7 +156,11 @@ mod tests {
         let mut rng = Rng::new(4, 0);
         let (vertices, frames, bound) = (500, 6, 0.01);
         let given: Vec<Vec<Vec3>> = (0..frames)
-            .map(|_| (0..vertices).map(|_| std::array::from_fn(|_| rng.unit())).collect())
+            .map(|_| {
+                (0..vertices)
+                    .map(|_| std::array::from_fn(|_| rng.unit()))
+                    .collect()
+            })
             .collect();
         let noise = |rng: &mut Rng| rng.range(-1.0, 1.0).powi(9) * 0.1;
         let near: Vec<Vec<Vec3>> = given
@@ -169,7 +175,11 @@ mod tests {
         for (held, given) in held.iter_mut().zip(&given) {
             encoder.frame(held, given);
         }
-        assert!(encoder.count > 100 && encoder.count < 2500, "{}", encoder.count);
+        assert!(
+            encoder.count > 100 && encoder.count < 2500,
+            "{}",
+            encoder.count
+        );
         let payload = encoder.finish();
         let mut decoder = Decoder::new(vertices, &payload).unwrap();
         for (f, mut frame) in near.into_iter().enumerate() {

@@ -91,14 +91,20 @@ impl<'a> State<'a> {
         for axis in 0..3 {
             let last = &self.last[axis];
             let change: Option<Vec<f64>> = given.map(|given| {
-                given[axis].iter().zip(last).map(|(now, last)| now - last).collect()
+                given[axis]
+                    .iter()
+                    .zip(last)
+                    .map(|(now, last)| now - last)
+                    .collect()
             });
             let wanted = Wanted {
                 values: change.as_deref(),
                 step: self.step,
                 price: PRICE,
             };
-            let held = self.fields.code(coder, self.hierarchy, &self.weights, &wanted);
+            let held = self
+                .fields
+                .code(coder, self.hierarchy, &self.weights, &wanted);
             for (last, change) in self.last[axis].iter_mut().zip(held) {
                 *last += change;
             }
@@ -168,19 +174,24 @@ pub fn decode(
 ) -> Result<Vec<Vec<Vec3>>, Fault> {
     let step = take_f64(&mut window).filter(|step| step.is_finite() && *step > 0.0);
     let step = step.ok_or_else(|| Fault::whole("a window's step is no number above 0; damaged"))?;
-    let mut state = State::new(&mut Reader::new(window), hierarchy, step, None);
+    let mut reader = Reader::new(window);
+    let mut state = State::new(&mut reader, hierarchy, step, None);
+    reader.check()?;
     let mut made = vec![state.positions()];
     for mut part in parts.iter().copied() {
         let left = frames - made.len();
         let count = take_number(&mut part).and_then(|count| usize::try_from(count).ok());
         let Some(count) = count.filter(|count| *count <= left) else {
-            return Err(Fault::whole("a window's part has more frames than are left; damaged"));
+            return Err(Fault::whole(
+                "a window's part has more frames than are left; damaged",
+            ));
         };
         let mut reader = Reader::new(part);
         for _ in 0..count {
             state.frame(&mut reader, None);
             made.push(state.positions());
         }
+        reader.check()?;
     }
     let last = state.positions();
     made.resize(frames, last);
@@ -195,14 +206,19 @@ mod tests {
     #[test]
     fn frames_come_back_with_no_growing_error() {
         let mesh = shapes::icosphere([0.0; 3], 1.0, 3);
-        let edges = mesh.triangles.iter().flat_map(|t| [[t[0], t[1]], [t[1], t[2]], [t[2], t[0]]]);
+        let edges = mesh
+            .triangles
+            .iter()
+            .flat_map(|t| [[t[0], t[1]], [t[1], t[2]], [t[2], t[0]]]);
         let vertices = mesh.positions.len();
         let hierarchy = Hierarchy::new(vertices, edges).unwrap();
         let frames = 40;
         let positions: Vec<Vec3> = (0..frames)
             .flat_map(|f| {
                 let t = f as f64 * 0.2;
-                mesh.positions.iter().map(move |p| [p[0] + t.sin(), p[1] * (1.0 + 0.3 * t.cos()), p[2]])
+                mesh.positions
+                    .iter()
+                    .map(move |p| [p[0] + t.sin(), p[1] * (1.0 + 0.3 * t.cos()), p[2]])
             })
             .collect();
         let trajectories = Trajectories {
@@ -224,7 +240,10 @@ mod tests {
                 .map(|(a, b)| (0..3).map(|i| (a[i] - b[i]).powi(2)).sum::<f64>())
                 .sum();
             // Numbers that are rounded down miss by a step at most.
-            assert!((error / (3 * vertices) as f64).sqrt() < 0.6 * step, "frame {f}");
+            assert!(
+                (error / (3 * vertices) as f64).sqrt() < 0.6 * step,
+                "frame {f}"
+            );
             total += error;
         }
         assert!((total / made.squared_error - 1.0).abs() < 1e-9);

@@ -36,6 +36,8 @@ pub struct Stats {
     pub corrected: u64,
     /// Bits by what they tell.
     pub bits: Bits,
+    /// Numbers that are told: of the mean shape or the first frame, of components, of corrections.
+    pub numbers: u64,
     /// Streams that were made on the way to the target.
     pub trials: u64,
     /// The squared error that the encoder expects of a decoder: the sum over all vertices and frames.
@@ -59,6 +61,21 @@ pub struct Bits {
     pub framing: f64,
     /// All of it.
     pub total: f64,
+}
+
+impl Bits {
+    /// All of them times a factor.
+    pub fn scaled(self, factor: f64) -> Bits {
+        Bits {
+            faces: self.faces * factor,
+            shape: self.shape * factor,
+            basis: self.basis * factor,
+            weights: self.weights * factor,
+            corrections: self.corrections * factor,
+            framing: self.framing * factor,
+            total: self.total * factor,
+        }
+    }
 }
 
 /// A stream and what it became.
@@ -181,7 +198,8 @@ impl<'a> Encoder<'a> {
         let of = |number: usize| {
             let frames = header.frames_of(number);
             Trajectories {
-                positions: &clip.positions[frames.start * header.vertices..frames.end * header.vertices],
+                positions: &clip.positions
+                    [frames.start * header.vertices..frames.end * header.vertices],
                 vertices: header.vertices,
                 origin,
                 scale: 2f64.powi(-exponent),
@@ -222,7 +240,9 @@ fn about_centroids(window: &Trajectories) -> f64 {
         let centre = values().sum::<f64>() / count;
         values().map(|x| (x - centre) * (x - centre)).sum::<f64>()
     };
-    (0..window.frames()).map(|frame| (0..3).map(|a| axis(frame, a)).sum::<f64>()).sum()
+    (0..window.frames())
+        .map(|frame| (0..3).map(|a| axis(frame, a)).sum::<f64>())
+        .sum()
 }
 
 impl Encoder<'_> {
@@ -254,11 +274,18 @@ impl Encoder<'_> {
     /// A step to begin with.
     fn first_step(&self, squared_error: f64) -> f64 {
         let share = squared_error / self.header.frames as f64;
-        let steps = self.analyses.iter().map(|a| a.first_step(share * a.frames() as f64));
+        let steps = self
+            .analyses
+            .iter()
+            .map(|a| a.first_step(share * a.frames() as f64));
         let middle = steps.sum::<f64>() / self.analyses.len() as f64;
         // No step is known for the last method: a cube's numbers miss by a twelfth of its square.
         let all = (3 * self.header.vertices * self.header.frames) as f64;
-        if middle.is_finite() { middle } else { (12.0 * squared_error / all).sqrt() }
+        if middle.is_finite() {
+            middle
+        } else {
+            (12.0 * squared_error / all).sqrt()
+        }
     }
 
     /// A stream for a target.
@@ -347,7 +374,12 @@ impl Encoder<'_> {
         if !(step > 0.0) {
             return false;
         }
-        let told = delta::encode(&sample, &self.ground.hierarchy, step.min(self.steps()[1]), count);
+        let told = delta::encode(
+            &sample,
+            &self.ground.hierarchy,
+            step.min(self.steps()[1]),
+            count,
+        );
         let each = told.motion_bits / (count - 1).max(1) as f64;
         told.shape_bits + each * (frames - 1) as f64 <= 0.98 * whole_bits
     }
@@ -410,7 +442,13 @@ impl Encoder<'_> {
     /// Adds what keeps every vertex within a bound, in local units.
     fn correct(&self, number: usize, method: Method, bound: f64, told: &mut Told) {
         let window = &self.windows[number];
-        let motion = Motion::read(method, &self.ground.hierarchy, window.frames(), &told.window, &told.parts);
+        let motion = Motion::read(
+            method,
+            &self.ground.hierarchy,
+            window.frames(),
+            &told.window,
+            &told.parts,
+        );
         let motion = motion.expect("what was just written is read");
         let mut encoder = corrections::Encoder::new(window.vertices, bound);
         let mut frame = vec![[0.0; 3]; window.vertices];
@@ -422,14 +460,25 @@ impl Encoder<'_> {
                 *given = std::array::from_fn(|axis| window.at(f, v, axis));
             }
             encoder.frame(&mut frame, &given);
-            let apart = frame.iter().zip(&given).map(|(p, q)| {
-                (0..3).map(|i| (p[i] - q[i]) * (p[i] - q[i])).sum::<f64>()
-            });
+            let apart = frame
+                .iter()
+                .zip(&given)
+                .map(|(p, q)| (0..3).map(|i| (p[i] - q[i]) * (p[i] - q[i])).sum::<f64>());
             told.squared_error += apart.sum::<f64>();
         }
         told.corrected = encoder.count;
         told.bits.corrections = encoder.spent();
         told.corrections = (encoder.count > 0).then(|| encoder.finish());
+    }
+
+    /// Numbers that a window is told by.
+    fn numbers(&self, number: usize, told: &Told) -> u64 {
+        let (vertices, frames) = (self.header.vertices, self.windows[number].frames());
+        let moving = match told.components {
+            Some(components) => components * (vertices + 3 * frames),
+            None => 3 * vertices * (frames - 1),
+        };
+        (3 * vertices + moving) as u64 + 3 * told.corrected
     }
 
     /// The stream of a trial: what all windows begin with first, then their parts in turn, so that a
@@ -449,7 +498,11 @@ impl Encoder<'_> {
         for (number, told) in windows.iter().enumerate() {
             section(Kind::Window, number, Some(method), &told.window);
         }
-        let rounds = windows.iter().map(|told| told.parts.len()).max().unwrap_or(0);
+        let rounds = windows
+            .iter()
+            .map(|told| told.parts.len())
+            .max()
+            .unwrap_or(0);
         for round in 0..rounds {
             for (number, told) in windows.iter().enumerate() {
                 if let Some(part) = told.parts.get(round) {
@@ -480,10 +533,17 @@ impl Encoder<'_> {
         let stats = Stats {
             method: method.name().to_owned(),
             windows: windows.len() as u64,
-            components: windows.iter().filter_map(|w| w.components).map(|c| c as u64).collect(),
+            components: windows
+                .iter()
+                .filter_map(|w| w.components)
+                .map(|c| c as u64)
+                .collect(),
             step: best.step * unit,
             corrected: windows.iter().map(|told| told.corrected).sum(),
             bits,
+            numbers: (0..windows.len())
+                .map(|n| self.numbers(n, &windows[n]))
+                .sum(),
             trials,
             predicted_squared_error: best.squared_error * unit * unit,
         };

@@ -173,7 +173,9 @@ impl Walk {
         self.last[3] = place.min(1 << 20) as i32;
         if place > 0 {
             let corner = self.corners.iter().rev().nth(place as usize - 1);
-            return corner.copied().ok_or_else(|| Fault::whole("a face refers to a corner before the first"));
+            return corner
+                .copied()
+                .ok_or_else(|| Fault::whole("a face refers to a corner before the first"));
         }
         let is_fresh = self.met.get(given as usize).is_some_and(|met| !met);
         let context = Context {
@@ -282,7 +284,12 @@ mod tests {
         let sphere = shapes::icosphere([0.0; 3], 1.0, 4);
         let faces = of(&sphere);
         let bits = 8 * round_trip(sphere.positions.len() as u32, &faces);
-        assert!(bits < 20 * faces.len(), "{} bits for {} faces", bits, faces.len());
+        assert!(
+            bits < 20 * faces.len(),
+            "{} bits for {} faces",
+            bits,
+            faces.len()
+        );
         let mut rng = Rng::new(11, 0);
         let mut shuffled = faces.clone();
         for i in (1..shuffled.len()).rev() {
@@ -298,7 +305,12 @@ mod tests {
         let sheet = shapes::sheet(1.0, 1.0, 60, 60);
         let faces = of(&sheet);
         let bits = 8 * round_trip(sheet.positions.len() as u32, &faces);
-        assert!(bits < 3 * faces.len(), "{} bits for {} faces", bits, faces.len());
+        assert!(
+            bits < 3 * faces.len(),
+            "{} bits for {} faces",
+            bits,
+            faces.len()
+        );
     }
 
     #[test]

@@ -35,7 +35,15 @@ impl Fields {
     pub fn new(hierarchy: &Hierarchy) -> Self {
         let levels = Hierarchy::LEVELS;
         let pairs = CLASSES * CLASSES;
-        let cells = [CLASSES * levels, CLASSES * levels, pairs, pairs, pairs, levels * NUMBERS, pairs];
+        let cells = [
+            CLASSES * levels,
+            CLASSES * levels,
+            pairs,
+            pairs,
+            pairs,
+            levels * NUMBERS,
+            pairs,
+        ];
         let still = vec![0.0; hierarchy.len()];
         Fields {
             model: Integers::new(cells, levels),
@@ -78,7 +86,10 @@ impl Fields {
         let mean = |(sum, count): (f32, f32)| (count > 0.0).then(|| f64::from(sum / count));
         let add = |(sum, count): (f32, f32), size: f32| (sum + size, count + 1.0);
         let ring = &hierarchy.rings.of(rank)[..hierarchy.inner[rank] as usize];
-        let coarser = ring.iter().map(|u| sizes[*u as usize]).fold((0.0, 0.0), add);
+        let coarser = ring
+            .iter()
+            .map(|u| sizes[*u as usize])
+            .fold((0.0, 0.0), add);
         let coarser = mean(coarser).unwrap_or(1.0);
         let (mut beside, mut last) = ((0.0, 0.0), (0.0, 0.0));
         for u in hierarchy.neighbours.of(rank) {
@@ -118,7 +129,10 @@ mod tests {
     #[test]
     fn fields_come_back_within_half_a_step_and_smooth_ones_are_short() {
         let mesh = shapes::icosphere([0.0; 3], 1.0, 4);
-        let edges = mesh.triangles.iter().flat_map(|t| [[t[0], t[1]], [t[1], t[2]], [t[2], t[0]]]);
+        let edges = mesh
+            .triangles
+            .iter()
+            .flat_map(|t| [[t[0], t[1]], [t[1], t[2]], [t[2], t[0]]]);
         let hierarchy = Hierarchy::new(mesh.positions.len(), edges).unwrap();
         let of = |rank: usize| mesh.positions[hierarchy.vertices[rank] as usize];
         let places: Vec<f64> = (0..hierarchy.len()).flat_map(of).collect();

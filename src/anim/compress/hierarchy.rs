@@ -84,7 +84,6 @@ struct Taken {
     inner: usize,
 }
 
-
 impl Thinning {
     /// Takes out the vertices of one round: those of few neighbours first, none beside another.
     fn round(&mut self, left: &mut Vec<u32>, round: u32) {
@@ -114,7 +113,11 @@ impl Thinning {
             self.around[*u as usize].retain(|w| *w != v);
         }
         let beyond = |u: &u32| self.around[*u as usize].iter().copied();
-        let outer: Vec<u32> = ring.iter().take(Hierarchy::WIDEST).flat_map(beyond).collect();
+        let outer: Vec<u32> = ring
+            .iter()
+            .take(Hierarchy::WIDEST)
+            .flat_map(beyond)
+            .collect();
         let centre = ring.iter().copied().min_by_key(|u| {
             let around = &self.around[*u as usize];
             let new = ring.iter().filter(|w| *w != u && !around.contains(w));
@@ -260,7 +263,10 @@ mod tests {
     #[test]
     fn every_vertex_of_a_sphere_stands_among_coarser_ones() {
         let mesh = shapes::icosphere([0.0; 3], 1.0, 4);
-        let edges = mesh.triangles.iter().flat_map(|t| [[t[0], t[1]], [t[1], t[2]], [t[2], t[0]]]);
+        let edges = mesh
+            .triangles
+            .iter()
+            .flat_map(|t| [[t[0], t[1]], [t[1], t[2]], [t[2], t[0]]]);
         let hierarchy = Hierarchy::new(mesh.positions.len(), edges).unwrap();
         check(&hierarchy, mesh.positions.len());
         let inner: u32 = hierarchy.inner.iter().sum();

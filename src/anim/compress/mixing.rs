@@ -15,7 +15,9 @@ const WHOLE: i32 = 1 << 16;
 
 /// The logistic function at every half nat from -8 to 8, in 2^16.
 const LOGISTIC: [i32; 33] = [
-    22, 36, 60, 98, 162, 267, 439, 720, 1179, 1921, 3108, 4971, 7812, 11955, 17625, 24743, 32768, 40793, 47911, 53581, 57724, 60565, 62428, 63615, 64357, 64816, 65097, 65269, 65374, 65438, 65476, 65500, 65514,
+    22, 36, 60, 98, 162, 267, 439, 720, 1179, 1921, 3108, 4971, 7812, 11955, 17625, 24743, 32768,
+    40793, 47911, 53581, 57724, 60565, 62428, 63615, 64357, 64816, 65097, 65269, 65374, 65438,
+    65476, 65500, 65514,
 ];
 
 /// The probability of these log odds, in 2^16.
@@ -129,7 +131,9 @@ impl<const N: usize> Mixture<N> {
         let missed = i64::from(aim) - i64::from(one);
         for (weight, odds) in self.weights[set].iter_mut().zip(odds) {
             let change = (i64::from(*odds) * missed * Self::RATE) >> 14;
-            *weight = weight.saturating_add(change as i32).clamp(-(WHOLE << 4), WHOLE << 4);
+            *weight = weight
+                .saturating_add(change as i32)
+                .clamp(-(WHOLE << 4), WHOLE << 4);
         }
     }
 }
@@ -143,7 +147,10 @@ mod tests {
         for (i, value) in LOGISTIC.iter().enumerate() {
             let x = i as f64 / 2.0 - 8.0;
             let exact = 65_536.0 / (1.0 + (-x).exp());
-            assert!((f64::from(*value) - exact).abs() <= 0.5, "{x}: {value} {exact}");
+            assert!(
+                (f64::from(*value) - exact).abs() <= 0.5,
+                "{x}: {value} {exact}"
+            );
         }
     }
 
@@ -164,7 +171,11 @@ mod tests {
         for i in 0..10_000 {
             p.meet(i % 10 == 0, 250);
         }
-        assert!((f64::from(p.one()) / 65_536.0 - 0.1).abs() < 0.02, "{}", p.one());
+        assert!(
+            (f64::from(p.one()) / 65_536.0 - 0.1).abs() < 0.02,
+            "{}",
+            p.one()
+        );
     }
 
     #[test]

@@ -21,4 +21,47 @@ mod trajectory;
 
 pub use encode::{Bits, Encoder, Ground, Made, Stats};
 pub use params::{Method, Params, Target};
-pub use stream::{Stream, Summary, summary};
+pub use stream::{Stream, Summary, is_stream, room_to_decode, summary};
+
+use crate::anim::Clip;
+use crate::trade::{Knob, Measure, Trade};
+
+/// What coding an animation trades for what.
+pub const TRADE: Trade = Trade {
+    knobs: &[
+        Knob {
+            name: "target-kg",
+            ladder: &["2", "0.5", "0.1", "0.02"],
+            numeric: true,
+            idle: &[],
+        },
+        Knob {
+            name: "method",
+            ladder: Method::NAMES,
+            numeric: false,
+            idle: &[],
+        },
+    ],
+    error: Measure {
+        name: "error about the centroids",
+        unit: "percent",
+    },
+    reference: "the animation as it was read",
+    result: "sanim",
+    placed: &[],
+    tied: &[],
+    invariant: &[],
+};
+
+/// Bytes that coding a clip takes beside the clip: products of all trajectories, directions and
+/// weights, and the hierarchy.
+pub fn room(clip: &Clip, params: &Params) -> u128 {
+    let (vertices, frames) = (
+        clip.vertices() as u128,
+        clip.frames().min(params.window) as u128,
+    );
+    let size = 3 * frames;
+    // Products, directions and the room of their search; then weights and what they are found from.
+    let windows = (clip.frames() as u128).div_ceil(frames.max(1));
+    size * size * 8 * (2 + windows) + vertices * (800 + size.min(200) * 8 * 3)
+}

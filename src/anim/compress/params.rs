@@ -102,7 +102,11 @@ impl Params {
             return Err(Error::parameter(option, value, "must be above 0"));
         }
         if !(1..=1024).contains(&self.window) {
-            return Err(Error::parameter("window", self.window, "must be between 1 and 1024"));
+            return Err(Error::parameter(
+                "window",
+                self.window,
+                "must be between 1 and 1024",
+            ));
         }
         Ok(())
     }

@@ -57,9 +57,12 @@ impl Weights {
             dims,
             affine,
         };
-        parts.into_par_iter().with_min_len(64).for_each_init(Room::default, |room, (rank, part)| {
-            known.krige(hierarchy.rings.of(rank), rank, room, part);
-        });
+        parts.into_par_iter().with_min_len(64).for_each_init(
+            Room::default,
+            |room, (rank, part)| {
+                known.krige(hierarchy.rings.of(rank), rank, room, part);
+            },
+        );
         Weights(all)
     }
 
@@ -217,7 +220,10 @@ mod tests {
     #[test]
     fn affine_functions_are_foreseen_and_constants_exactly() {
         let mesh = shapes::icosphere([0.0; 3], 1.0, 3);
-        let edges = mesh.triangles.iter().flat_map(|t| [[t[0], t[1]], [t[1], t[2]], [t[2], t[0]]]);
+        let edges = mesh
+            .triangles
+            .iter()
+            .flat_map(|t| [[t[0], t[1]], [t[1], t[2]], [t[2], t[0]]]);
         let hierarchy = Hierarchy::new(mesh.positions.len(), edges).unwrap();
         let of = |rank: usize| mesh.positions[hierarchy.vertices[rank] as usize];
         let places: Vec<f64> = (0..hierarchy.len()).flat_map(of).collect();
@@ -237,7 +243,11 @@ mod tests {
     fn places_that_coincide_are_no_trouble() {
         let edges = (1..20u32).flat_map(|v| [[v - 1, v], [v / 2, v]]);
         let hierarchy = Hierarchy::new(20, edges).unwrap();
-        for places in [vec![0.0; 60], vec![1e300; 60], (0..60).map(|i| f64::from(i / 6)).collect()] {
+        for places in [
+            vec![0.0; 60],
+            vec![1e300; 60],
+            (0..60).map(|i| f64::from(i / 6)).collect(),
+        ] {
             let weights = Weights::new(&hierarchy, &places, 3, 1000.0);
             assert!(weights.0.iter().all(|w| w.is_finite()));
         }

@@ -71,7 +71,11 @@ pub fn search<T: Send>(
     let [least, most] = range;
     let clamp = |step: f64| step.clamp(least, most);
     let first = clamp(first);
-    let second = clamp(if first < most { 1.25 * first } else { first / 1.25 });
+    let second = clamp(if first < most {
+        1.25 * first
+    } else {
+        first / 1.25
+    });
     let (a, b) = rayon::join(|| trial(first), || trial(second));
     let mut all = vec![a, b];
     let target = wanted.target();
@@ -85,7 +89,10 @@ pub fn search<T: Send>(
             break;
         }
         let step = clamp(next(wanted, aim, &all));
-        if all.iter().any(|trial| (trial.step / step - 1.0).abs() < 1e-4) {
+        if all
+            .iter()
+            .any(|trial| (trial.step / step - 1.0).abs() < 1e-4)
+        {
             break;
         }
         all.push(trial(step));

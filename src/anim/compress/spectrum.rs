@@ -172,11 +172,18 @@ pub fn spectrum(trajectories: &Trajectories, means: &[Vec3]) -> Spectrum {
         .map(|i| {
             let column = eigen.eigenvectors.column(*i);
             let mut vector = vec![0.0; size];
-            for (time, out) in column.as_slice().chunks_exact(frames).zip(vector.chunks_exact_mut(frames)) {
+            for (time, out) in column
+                .as_slice()
+                .chunks_exact(frames)
+                .zip(vector.chunks_exact_mut(frames))
+            {
                 cosines.transform(time, out);
             }
             // A direction has no sign of its own: its largest number is made positive.
-            let largest = vector.iter().copied().max_by(|a, b| a.abs().total_cmp(&b.abs()));
+            let largest = vector
+                .iter()
+                .copied()
+                .max_by(|a, b| a.abs().total_cmp(&b.abs()));
             if largest.is_some_and(|largest| largest < 0.0) {
                 vector.iter_mut().for_each(|x| *x = -*x);
             }

@@ -59,7 +59,9 @@ impl Header {
         let damaged = |what: &str| Fault::whole(format!("the header has no {what}; damaged"));
         let mut count = |what| {
             let count = take_number(&mut payload).filter(|count| *count < MOST);
-            count.map(|count| count as usize).ok_or_else(|| damaged(what))
+            count
+                .map(|count| count as usize)
+                .ok_or_else(|| damaged(what))
         };
         let (vertices, frames) = (count("number of vertices")?, count("number of frames")?);
         let (faces, window) = (count("number of faces")?, count("length of windows")?);
@@ -227,7 +229,9 @@ fn open(bytes: &[u8]) -> Result<Opened<'_>, Fault> {
         let mut payload = section.payload;
         let problem = |what: &str| {
             let kind = section.kind.name();
-            Err(Fault::whole(format!("section {number} ({kind}): {what}; damaged")))
+            Err(Fault::whole(format!(
+                "section {number} ({kind}): {what}; damaged"
+            )))
         };
         let Some(window) = take_number(&mut payload).map(|window| window as usize) else {
             return problem("names no window");
@@ -274,6 +278,21 @@ fn open(bytes: &[u8]) -> Result<Opened<'_>, Fault> {
     })
 }
 
+/// Whether bytes begin as a stream does.
+pub fn is_stream(bytes: &[u8]) -> bool {
+    bytes.starts_with(container::MAGIC)
+}
+
+/// Bytes that decoding so many frames of a stream takes, for the frames themselves and what they are
+/// made of.
+pub fn room_to_decode(summary: &Summary, frames: usize) -> u128 {
+    let (vertices, window) = (u128::from(summary.vertices), u128::from(summary.windows[1]));
+    let most = summary.components.iter().copied().max().unwrap_or(0);
+    // Weights twice, and what foresees them; then places, rings and neighbours.
+    let held = u128::from(most) * (2 * vertices + 3 * window) * 8 + vertices * 800;
+    vertices * frames as u128 * 24 + held + u128::from(summary.faces) * 48
+}
+
 /// What stands in a stream. Cost: one pass over the bytes, for their checksums.
 pub fn summary(bytes: &[u8]) -> Result<Summary, Fault> {
     let opened = open(bytes)?;
@@ -295,7 +314,10 @@ pub fn summary(bytes: &[u8]) -> Result<Summary, Fault> {
         }
     }
     let components = |window: &Parts| {
-        let counts = window.parts.iter().map(|part| take_number(&mut &**part).unwrap_or(0));
+        let counts = window
+            .parts
+            .iter()
+            .map(|part| take_number(&mut &**part).unwrap_or(0));
         (window.method != Method::Delta).then(|| counts.sum())
     };
     Ok(Summary {
@@ -305,7 +327,11 @@ pub fn summary(bytes: &[u8]) -> Result<Summary, Fault> {
         faces: header.faces as u64,
         rate: header.rate,
         windows: [header.windows() as u64, header.window as u64],
-        methods: opened.windows.iter().map(|w| w.method.name().to_owned()).collect(),
+        methods: opened
+            .windows
+            .iter()
+            .map(|w| w.method.name().to_owned())
+            .collect(),
         components: opened.windows.iter().filter_map(components).collect(),
         sections,
         cut_off_at: opened.sections.cut.map(|at| at as u64),
@@ -339,6 +365,7 @@ impl<'a> Stream<'a> {
         let vertices = header.vertices as u32;
         let mut reader = Reader::new(opened.faces);
         let faces = faces::code(&mut reader, vertices, header.faces, std::iter::empty())?;
+        reader.check()?;
         let hierarchy = Hierarchy::new(header.vertices, edges(&faces));
         let hierarchy = hierarchy.map_err(|error| Fault::whole(error.to_string()))?;
         let mut windows = Vec::new();

@@ -97,7 +97,14 @@ impl Directions {
 
     fn new(frames: usize) -> Self {
         let pairs = CLASSES * CLASSES;
-        let cells = [CLASSES, CLASSES, pairs, 3 * Self::NUMBERS, Self::NUMBERS, pairs];
+        let cells = [
+            CLASSES,
+            CLASSES,
+            pairs,
+            3 * Self::NUMBERS,
+            Self::NUMBERS,
+            pairs,
+        ];
         Directions {
             model: Integers::new(cells, 1),
             steps: Integers::new([1], 1),
@@ -110,12 +117,19 @@ impl Directions {
 
     /// Quarters of a power of two that make the step of a direction of this length.
     fn exponent(step: f64, length: f64) -> i32 {
-        (4.0 * (length / (COARSER * step)).log2()).round().clamp(-4000.0, 4000.0) as i32
+        (4.0 * (length / (COARSER * step)).log2())
+            .round()
+            .clamp(-4000.0, 4000.0) as i32
     }
 
     /// `2^(-exponent / 4)`.
     fn step(exponent: i32) -> f64 {
-        const ROOTS: [f64; 4] = [1.0, 0.8408964152537145, std::f64::consts::FRAC_1_SQRT_2, 0.5946035575013605];
+        const ROOTS: [f64; 4] = [
+            1.0,
+            0.8408964152537145,
+            std::f64::consts::FRAC_1_SQRT_2,
+            0.5946035575013605,
+        ];
         ROOTS[exponent.rem_euclid(4) as usize] * 2f64.powi(-exponent.div_euclid(4))
     }
 
@@ -128,10 +142,7 @@ impl Directions {
         chosen: Option<&[i32]>,
     ) -> (Vec<f64>, Vec<i32>) {
         let exponent = given.map_or(0, |(_, exponent)| exponent);
-        let context = Context {
-            cells: [0],
-            set: 0,
-        };
+        let context = Context { cells: [0], set: 0 };
         let change = self.steps.code(coder, &context, exponent - self.exponent);
         self.exponent = self.exponent.saturating_add(change).clamp(-4000, 4000);
         let step = Self::step(self.exponent);
@@ -158,7 +169,10 @@ impl Directions {
         }
         self.before = sizes;
         self.met += 1;
-        (numbers.iter().map(|n| f64::from(*n) * step).collect(), numbers)
+        (
+            numbers.iter().map(|n| f64::from(*n) * step).collect(),
+            numbers,
+        )
     }
 
     fn context(&self, sizes: &[f32], k: usize, axis: usize) -> Context<6> {
@@ -258,11 +272,17 @@ impl State<'_> {
     fn weights(&mut self, coder: &mut impl Coder, length: f64, values: Option<&[f64]>) {
         let wanted = Wanted {
             values,
-            step: if length > 0.0 { self.step / length } else { 0.0 },
+            step: if length > 0.0 {
+                self.step / length
+            } else {
+                0.0
+            },
             price: PRICE,
         };
         let hierarchy = self.foresight.hierarchy;
-        let field = self.fields.code(coder, hierarchy, &self.foresight.weights, &wanted);
+        let field = self
+            .fields
+            .code(coder, hierarchy, &self.foresight.weights, &wanted);
         self.held.push(field);
         self.lengths.push(length);
     }
@@ -381,7 +401,10 @@ impl<'a> Analysis<'a> {
         // having.
         let least = PRICE * step * step * 0.01 * (size + self.means.len()) as f64;
         let energies = self.spectrum.energies.iter();
-        let count = energies.take_while(|energy| **energy > least).count().min(MOST);
+        let count = energies
+            .take_while(|energy| **energy > least)
+            .count()
+            .min(MOST);
         let mut coder = Directions::new(self.frames());
         let (mut numbers, mut exponents, mut held) = (Vec::new(), Vec::new(), Vec::new());
         let vectors = self.spectrum.vectors.chunks_exact(size);
@@ -401,20 +424,27 @@ impl<'a> Analysis<'a> {
         let (numbers, exponents, directions) = self.directions(state.step);
         let count = directions.len();
         let mut time = vec![0.0; count * size];
-        time.par_chunks_mut(size).zip(&directions).for_each(|(time, direction)| {
-            let axes = time.chunks_exact_mut(self.frames());
-            for (time, there) in axes.zip(direction.chunks_exact(self.frames())) {
-                self.cosines.inverse(there, time);
-            }
-        });
+        time.par_chunks_mut(size)
+            .zip(&directions)
+            .for_each(|(time, direction)| {
+                let axes = time.chunks_exact_mut(self.frames());
+                for (time, there) in axes.zip(direction.chunks_exact(self.frames())) {
+                    self.cosines.inverse(there, time);
+                }
+            });
         let onto = self.trajectories.onto(&time, count, &self.means);
         drop(time);
         let mut part = Part::new();
+        let mut spent_on: Vec<[f64; 2]> = Vec::new();
         let mut failed: Option<(usize, Part)> = None;
         for q in 0..count {
             let before = part.clone();
             let spent = part.writer.spent();
-            state.directions.code(&mut part.writer, Some((&[], exponents[q])), Some(&numbers[q]));
+            state.directions.code(
+                &mut part.writer,
+                Some((&[], exponents[q])),
+                Some(&numbers[q]),
+            );
             let basis = part.writer.spent() - spent;
             let length = length(&directions[q]);
             let values = self.residual(state, &onto, &directions, q, length);
@@ -429,8 +459,7 @@ impl<'a> Analysis<'a> {
                 * length
                 * length;
             made.squared_error -= gain;
-            made.basis_bits += basis;
-            made.weight_bits += bits - basis;
+            spent_on.push([basis, bits - basis]);
             part.components += 1;
             let pays = gain > PRICE * state.step * state.step * bits;
             if pays {
@@ -443,7 +472,7 @@ impl<'a> Analysis<'a> {
             }
             state.learn();
             if failed.is_none() && part.bytes() >= PART {
-                part.end(&mut made.parts, q + 1);
+                part.end(&mut made.parts);
             }
         }
         let count = state.held.len();
@@ -457,13 +486,21 @@ impl<'a> Analysis<'a> {
         // What the last components, which are left out, seemed to gain is given back.
         for q in kept..count {
             let squared = length(&directions[q]).powi(2);
-            let values = self.residual_with(&state.held[..q], &onto, &directions, q, squared.sqrt());
+            let values =
+                self.residual_with(&state.held[..q], &onto, &directions, q, squared.sqrt());
             let held = &state.held[q];
-            let gain = values.iter().zip(held).map(|(v, h)| v * v - (v - h) * (v - h));
+            let gain = values
+                .iter()
+                .zip(held)
+                .map(|(v, h)| v * v - (v - h) * (v - h));
             made.squared_error += gain.sum::<f64>() * squared;
         }
-        part.end(&mut made.parts, kept);
+        part.end(&mut made.parts);
         made.components = kept;
+        for [basis, weights] in &spent_on[..kept] {
+            made.basis_bits += basis;
+            made.weight_bits += weights;
+        }
     }
 
     fn residual(
@@ -511,7 +548,6 @@ impl<'a> Analysis<'a> {
 struct Part {
     writer: Writer,
     components: usize,
-    from: f64,
 }
 
 impl Part {
@@ -519,16 +555,15 @@ impl Part {
         Part {
             writer: Writer::new(),
             components: 0,
-            from: 0.0,
         }
     }
 
     fn bytes(&self) -> usize {
-        ((self.writer.spent() - self.from) / 8.0) as usize
+        (self.writer.spent() / 8.0) as usize
     }
 
     /// Ends the part, where there is anything in it, and begins the next.
-    fn end(&mut self, parts: &mut Vec<Vec<u8>>, _upto: usize) {
+    fn end(&mut self, parts: &mut Vec<Vec<u8>>) {
         let part = std::mem::replace(self, Part::new());
         if part.components > 0 {
             let mut payload = Vec::new();
@@ -555,6 +590,7 @@ pub fn decode(
     let mut reader = Reader::new(window);
     let head = Head { step, affine };
     let (mut state, shape) = begin(&mut reader, hierarchy, frames, head, None);
+    reader.check()?;
     let mut directions = Vec::new();
     for mut part in parts.iter().copied() {
         let count = take_number(&mut part).filter(|count| *count <= MOST as u64);
@@ -569,6 +605,7 @@ pub fn decode(
                 return Err(damaged("components are too many"));
             }
         }
+        reader.check()?;
     }
     let root = (frames as f64).sqrt();
     let mut means = vec![[0.0; 3]; hierarchy.len()];
