@@ -92,7 +92,7 @@ impl Encoder {
     /// For so many vertices, none of which may be farther than the bound.
     pub fn new(vertices: usize, bound: f64) -> Self {
         Encoder {
-            state: Corrections::new(vertices, Corrections::step_for(bound)),
+            state: Corrections::new(vertices, Corrections::step_for(bound.min(1e30))),
             writer: Writer::new(),
             bound,
             count: 0,

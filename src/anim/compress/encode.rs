@@ -21,6 +21,9 @@ use serde::Serialize;
 /// Frames by which `auto` judges the method that tells one frame after the other.
 const SAMPLE: usize = 12;
 
+/// Share of the whole below which an error that is what sums leave of one another is measured instead.
+const ROUNDED: f64 = 1e-9;
+
 /// What a stream became.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct Stats {
@@ -118,7 +121,8 @@ pub struct Encoder<'a> {
     analyses: Vec<Analysis<'a>>,
     faces: Vec<u8>,
     face_bits: f64,
-    /// Sum of the squared distances to each frame's centroid, in local units.
+    /// Sum of the squared distances to each frame's centroid, in local units; 0 where every frame is
+    /// a point.
     norm: f64,
 }
 
@@ -256,7 +260,15 @@ impl Encoder<'_> {
     fn squared_error(&self, target: Target) -> Option<f64> {
         let positions = (self.header.vertices * self.header.frames) as f64;
         match target {
-            Target::Kg(percent) => Some(self.norm * (percent / 100.0) * (percent / 100.0)),
+            Target::Kg(percent) => {
+                // Points have no extent that an error could be a share of: theirs is one of the way.
+                let whole = if self.norm > 0.0 {
+                    self.norm
+                } else {
+                    positions
+                };
+                Some(whole * (percent / 100.0) * (percent / 100.0))
+            }
             Target::Rmse(x) => {
                 let x = x / self.header.unit();
                 Some(positions * x * x)
@@ -317,7 +329,7 @@ impl Encoder<'_> {
             }
             Target::Bpvf(bits) => {
                 let positions = (self.header.vertices * self.header.frames) as f64;
-                let first = self.first_step(1e-6 * self.norm);
+                let first = self.first_step(1e-6 * self.norm.max(1e-3 * positions));
                 let wanted = search::Wanted::Bits(bits * positions);
                 search::search(wanted, first, self.steps(), trial)
             }
@@ -341,9 +353,8 @@ impl Encoder<'_> {
             Target::Bpvf(_) => best.bits / positions,
             Target::Max(_) => return Ok(()),
         };
-        // A clip without extent has no error, and no share of nothing.
         let wanted = target.value();
-        if reached <= wanted || reached.is_nan() || best.squared_error == 0.0 {
+        if reached <= wanted || self.norm == 0.0 && matches!(target, Target::Kg(_)) {
             return Ok(());
         }
         let problem = format!("cannot be reached; the least for this clip is {reached:.6e}");
@@ -354,9 +365,10 @@ impl Encoder<'_> {
     /// the middle of the first window.
     fn delta_is_shorter(&self, target: Target) -> bool {
         let window = &self.windows[0];
+        let positions = (self.header.vertices * self.header.frames) as f64;
         let error = match self.squared_error(target) {
             Some(error) => error,
-            None => 1e-6 * self.norm,
+            None => 1e-6 * self.norm.max(1e-3 * positions),
         };
         let step = self.first_step(error);
         let whole = self.analyses[0].encode(step, trajectory::AFFINE);
@@ -391,8 +403,12 @@ impl Encoder<'_> {
                 Method::Delta => self.by_frames(number, step),
                 _ => self.by_components(number, step),
             };
-            if let Some(bound) = bound {
-                self.correct(number, method, bound, &mut told);
+            match bound {
+                Some(bound) => self.correct(number, method, bound, &mut told),
+                None if told.squared_error < ROUNDED * self.norm => {
+                    self.correct(number, method, f64::INFINITY, &mut told);
+                }
+                None => {}
             }
             told
         };
@@ -439,7 +455,7 @@ impl Encoder<'_> {
         }
     }
 
-    /// Adds what keeps every vertex within a bound, in local units.
+    /// Adds what keeps every vertex within a bound, in local units, and measures the error.
     fn correct(&self, number: usize, method: Method, bound: f64, told: &mut Told) {
         let window = &self.windows[number];
         let motion = Motion::read(

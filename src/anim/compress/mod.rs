@@ -65,3 +65,6 @@ pub fn room(clip: &Clip, params: &Params) -> u128 {
     let windows = (clip.frames() as u128).div_ceil(frames.max(1));
     size * size * 8 * (2 + windows) + vertices * (800 + size.min(200) * 8 * 3)
 }
+
+#[cfg(test)]
+mod tests;

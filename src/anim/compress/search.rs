@@ -56,7 +56,9 @@ impl Wanted {
 }
 
 /// Most rounds of trials.
-const ROUNDS: usize = 12;
+const ROUNDS: usize = 16;
+/// Steps that are nearer to one another than this, as logarithms, are not told apart.
+const NARROWEST: f64 = 0.003;
 
 /// The best trial there is, and how many were made; the best of all misses the target where none
 /// reaches it.
@@ -88,13 +90,9 @@ pub fn search<T: Send>(
         if all.iter().any(|trial| near(&trial)) {
             break;
         }
-        let step = clamp(next(wanted, aim, &all));
-        if all
-            .iter()
-            .any(|trial| (trial.step / step - 1.0).abs() < 1e-4)
-        {
+        let Some(step) = next(wanted, aim, range, &all) else {
             break;
-        }
+        };
         all.push(trial(step));
         count += 1;
         thin(wanted, aim, &mut all);
@@ -112,27 +110,39 @@ pub fn search<T: Send>(
     (best.expect("two trials were made"), count)
 }
 
-/// The step for the aim by a power law through the two trials nearest to it.
-fn next<T>(wanted: Wanted, aim: f64, all: &[Trial<T>]) -> f64 {
-    let off = |trial: &Trial<T>| (wanted.of(trial).max(f64::MIN_POSITIVE) / aim).ln();
-    let mut order: Vec<&Trial<T>> = all.iter().collect();
-    order.sort_by(|a, b| off(a).abs().total_cmp(&off(b).abs()));
-    let below = order.iter().find(|trial| off(trial) < 0.0);
-    let above = order.iter().find(|trial| off(trial) >= 0.0);
-    let (a, b) = match (below, above) {
-        (Some(below), Some(above)) => (*below, *above),
-        _ => (order[0], order[1]),
-    };
-    let between = (b.step / a.step).ln();
-    let slope = match between {
-        0.0 => wanted.power(),
-        between => (off(b) - off(a)) / between,
-    };
-    // What does not change as it must says nothing.
-    let sound = slope.is_finite() && slope * wanted.power() > 0.05;
-    let slope = if sound { slope } else { wanted.power() };
-    let nearest = order[0];
-    nearest.step * (-off(nearest) / slope).clamp(-3.0, 3.0).exp()
+/// The next step to try: by a power law between the two trials that the aim lies between, or away
+/// from the nearest where all are on one side; none where nothing is left between them, or beyond.
+fn next<T>(wanted: Wanted, aim: f64, range: [f64; 2], all: &[Trial<T>]) -> Option<f64> {
+    // Grows with the step, from below 0 to above.
+    let sign = wanted.power().signum();
+    let off = |trial: &Trial<T>| sign * (wanted.of(trial).max(f64::MIN_POSITIVE) / aim).ln();
+    let steps = |trial: &&Trial<T>, other: &&Trial<T>| trial.step.total_cmp(&other.step);
+    let below = all.iter().filter(|trial| off(trial) < 0.0).max_by(steps);
+    let above = all.iter().filter(|trial| off(trial) >= 0.0).min_by(steps);
+    match (below, above) {
+        (Some(below), Some(above)) => {
+            let width = (above.step / below.step).ln();
+            if width < NARROWEST {
+                return None;
+            }
+            // Where the curve jumps, a line through its ends would creep along one of them.
+            let share = -off(below) / (off(above) - off(below));
+            let share = if share.is_finite() {
+                share.clamp(0.1, 0.9)
+            } else {
+                0.5
+            };
+            Some(below.step * (share * width).exp())
+        }
+        (nearest, None) | (None, nearest) => {
+            let nearest = nearest?;
+            let way = (-off(nearest) / wanted.power().abs()).clamp(-3.0, 3.0);
+            // A little farther, so that the aim comes to lie between.
+            let step = nearest.step * (1.1 * way).exp();
+            let step = step.clamp(range[0], range[1]);
+            (step != nearest.step).then_some(step)
+        }
+    }
 }
 
 /// Lets go of trials that no longer tell: all but the two nearest on each side of the aim.
