@@ -150,9 +150,31 @@ const BOUNDS: [f64; 19] = [
 /// Number of classes of [`class_of`].
 pub const CLASSES: usize = BOUNDS.len() + 1;
 
+/// Classes of small magnitudes, by their hundredths.
+const SMALL: [u8; 1024] = {
+    let mut table = [0; 1024];
+    let (mut i, mut class) = (0, 0);
+    while i < 1024 {
+        while i as f64 > BOUNDS[class] * 100.0 {
+            class += 1;
+        }
+        table[i] = class as u8;
+        i += 1;
+    }
+    table
+};
+
 /// The class of an expected magnitude, for use as a cell.
+#[inline]
 pub fn class_of(expected: f64) -> usize {
-    BOUNDS.partition_point(|bound| expected > *bound)
+    // Rounded up, as a bound is still of the class below it.
+    let hundredths = expected * 100.0;
+    let below = hundredths as usize;
+    let place = below + usize::from((below as f64) < hundredths);
+    match SMALL.get(place) {
+        Some(class) => usize::from(*class),
+        None => BOUNDS.partition_point(|bound| expected > *bound),
+    }
 }
 
 #[cfg(test)]
@@ -188,6 +210,16 @@ mod tests {
             assert_eq!(before, *value, "number {i}");
         }
         bytes.len()
+    }
+
+    #[test]
+    fn classes_are_those_of_the_bounds() {
+        for i in 0..60_000 {
+            let x = f64::from(i) * 0.0117;
+            let class = BOUNDS.partition_point(|bound| x > *bound);
+            assert_eq!(class_of(x), class, "{x}");
+        }
+        assert_eq!(class_of(1e9), CLASSES - 1);
     }
 
     #[test]

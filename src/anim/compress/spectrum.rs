@@ -88,31 +88,30 @@ impl Trajectories<'_> {
         sums
     }
 
-    /// The products of each vertex's trajectory less its mean with `count` vectors of `3 F` numbers:
-    /// those of vertex `v` begin at `v * count`.
-    pub fn onto(&self, vectors: &[f64], count: usize, means: &[Vec3]) -> Vec<f64> {
+    /// The products of each vertex's trajectory less its mean with vectors of `3 F` numbers: for each
+    /// vector a value for every vertex.
+    pub fn onto(&self, vectors: &[f64], means: &[Vec3]) -> Vec<Vec<f64>> {
         let size = 3 * self.frames();
-        let mut all = vec![0.0; self.vertices * count];
-        let of = |block: &mut Vec<f64>, (first, out): (usize, &mut [f64])| {
+        let of = |block: &mut Vec<f64>, first: usize| {
             self.block(first * BLOCK, means, block);
-            let mut sums = vec![0.0; BLOCK];
-            for (q, vector) in vectors.chunks_exact(size).enumerate() {
-                sums.fill(0.0);
-                for (value, row) in vector.iter().zip(block.chunks_exact(BLOCK)) {
+            let vectors = vectors.chunks_exact(size);
+            let product = |vector: &[f64]| {
+                let mut sums = [0.0; BLOCK];
+                for (value, row) in vector.iter().zip(block.as_chunks::<BLOCK>().0) {
                     for (sum, x) in sums.iter_mut().zip(row) {
                         *sum += value * x;
                     }
                 }
-                for (out, sum) in out.chunks_exact_mut(count).zip(&sums) {
-                    out[q] = *sum;
-                }
-            }
+                sums
+            };
+            vectors.map(product).collect::<Vec<_>>()
         };
-        if count > 0 {
-            let blocks = all.par_chunks_mut(BLOCK * count).enumerate();
-            blocks.for_each_init(Vec::new, of);
-        }
-        all
+        let blocks = (0..self.vertices.div_ceil(BLOCK)).into_par_iter();
+        let blocks: Vec<_> = blocks.map_init(Vec::new, of).collect();
+        let value = |q: usize, v: usize| blocks[v / BLOCK][q][v % BLOCK];
+        (0..vectors.len() / size)
+            .map(|q| (0..self.vertices).map(|v| value(q, v)).collect())
+            .collect()
     }
 
     /// The squared lengths of all trajectories less their means, summed.
@@ -306,8 +305,8 @@ mod tests {
         for (time, there) in parts.zip(found.vectors.chunks_exact(frames)) {
             cosines.inverse(there, time);
         }
-        let onto = trajectories.onto(&time, 2, &means);
-        let held: f64 = onto.iter().map(|x| x * x).sum();
+        let onto = trajectories.onto(&time, &means);
+        let held: f64 = onto.iter().flatten().map(|x| x * x).sum();
         assert!((held / total - 1.0).abs() < 1e-10);
     }
 }

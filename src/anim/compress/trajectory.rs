@@ -36,6 +36,8 @@ const PATIENCE: usize = 4;
 const PART: usize = 3000;
 /// Components of a window at most.
 const MOST: usize = 4096;
+/// Directions that trajectories are multiplied with at a time.
+const TOGETHER: usize = 32;
 
 /// What is known of a window before a step is chosen.
 #[derive(Debug)]
@@ -263,13 +265,14 @@ struct State<'a> {
     fields: Fields,
     directions: Directions,
     step: f64,
-    held: Vec<Vec<f64>>,
+    /// The first fields and the lengths of their directions: as many as weights are foreseen from.
+    first: Vec<Vec<f64>>,
     lengths: Vec<f64>,
 }
 
 impl State<'_> {
-    /// Codes the weights of a direction of this length.
-    fn weights(&mut self, coder: &mut impl Coder, length: f64, values: Option<&[f64]>) {
+    /// Codes the weights of a direction of this length; returns those the stream holds.
+    fn weights(&mut self, coder: &mut impl Coder, length: f64, values: Option<&[f64]>) -> Vec<f64> {
         let wanted = Wanted {
             values,
             step: if length > 0.0 {
@@ -283,13 +286,12 @@ impl State<'_> {
         let field = self
             .fields
             .code(coder, hierarchy, &self.foresight.weights, &wanted);
-        self.held.push(field);
-        self.lengths.push(length);
-    }
-
-    /// After the components of this number are known for good.
-    fn learn(&mut self) {
-        self.foresight.learn(&self.held, &self.lengths);
+        if self.first.len() < STAGES[STAGES.len() - 1] {
+            self.first.push(field.clone());
+            self.lengths.push(length);
+            self.foresight.learn(&self.first, &self.lengths);
+        }
+        field
     }
 }
 
@@ -318,7 +320,7 @@ fn begin<'a>(
         fields: Fields::new(hierarchy),
         directions: Directions::new(frames),
         step: head.step,
-        held: Vec::new(),
+        first: Vec::new(),
         lengths: Vec::new(),
     };
     (state, shape)
@@ -420,49 +422,34 @@ impl<'a> Analysis<'a> {
 
     /// Codes components until one more does not pay.
     fn components(&self, state: &mut State, made: &mut Encoded) {
-        let size = 3 * self.frames();
         let (numbers, exponents, directions) = self.directions(state.step);
-        let count = directions.len();
-        let mut time = vec![0.0; count * size];
-        time.par_chunks_mut(size)
-            .zip(&directions)
-            .for_each(|(time, direction)| {
-                let axes = time.chunks_exact_mut(self.frames());
-                for (time, there) in axes.zip(direction.chunks_exact(self.frames())) {
-                    self.cosines.inverse(there, time);
-                }
-            });
-        let onto = self.trajectories.onto(&time, count, &self.means);
-        drop(time);
         let mut part = Part::new();
-        let mut spent_on: Vec<[f64; 2]> = Vec::new();
+        let mut held: Vec<Vec<f32>> = Vec::new();
+        // Of each component the bits of its direction and of its weights, and the error it takes away.
+        let mut each: Vec<[f64; 3]> = Vec::new();
         let mut failed: Option<(usize, Part)> = None;
-        for q in 0..count {
+        let mut onto = Vec::new();
+        for (q, direction) in directions.iter().enumerate() {
+            if q % TOGETHER == 0 {
+                let some = &directions[q..directions.len().min(q + TOGETHER)];
+                onto = self.onto(some);
+            }
             let before = part.clone();
-            let spent = part.writer.spent();
-            state.directions.code(
-                &mut part.writer,
-                Some((&[], exponents[q])),
-                Some(&numbers[q]),
-            );
-            let basis = part.writer.spent() - spent;
-            let length = length(&directions[q]);
-            let values = self.residual(state, &onto, &directions, q, length);
-            state.weights(&mut part.writer, length, Some(&values));
-            let bits = part.writer.spent() - spent;
-            let held = &state.held[q];
-            let gain: f64 = values
-                .iter()
-                .zip(held)
-                .map(|(value, held)| value * value - (value - held) * (value - held))
-                .sum::<f64>()
-                * length
-                * length;
-            made.squared_error -= gain;
-            spent_on.push([basis, bits - basis]);
+            let start = part.writer.spent();
+            let given = Some(([].as_slice(), exponents[q]));
+            let coder = &mut part.writer;
+            state.directions.code(coder, given, Some(&numbers[q]));
+            let basis = coder.spent() - start;
+            let length = length(direction);
+            let values = self.left(&onto[q % TOGETHER], &held, &directions, q);
+            let field = state.weights(coder, length, Some(&values));
+            let bits = coder.spent() - start;
+            let gain = values.iter().zip(&field);
+            let gain = gain.map(|(v, h)| v * v - (v - h) * (v - h)).sum::<f64>() * length * length;
+            held.push(field.iter().map(|x| *x as f32).collect());
+            each.push([basis, bits - basis, gain]);
             part.components += 1;
-            let pays = gain > PRICE * state.step * state.step * bits;
-            if pays {
+            if gain > PRICE * state.step * state.step * bits {
                 failed = None;
             } else {
                 let (since, _) = failed.get_or_insert((q, before));
@@ -470,72 +457,53 @@ impl<'a> Analysis<'a> {
                     break;
                 }
             }
-            state.learn();
             if failed.is_none() && part.bytes() >= PART {
                 part.end(&mut made.parts);
             }
         }
-        let count = state.held.len();
-        let kept = match failed {
-            Some((since, before)) => {
-                part = before;
-                since
-            }
-            None => count,
-        };
-        // What the last components, which are left out, seemed to gain is given back.
-        for q in kept..count {
-            let squared = length(&directions[q]).powi(2);
-            let values =
-                self.residual_with(&state.held[..q], &onto, &directions, q, squared.sqrt());
-            let held = &state.held[q];
-            let gain = values
-                .iter()
-                .zip(held)
-                .map(|(v, h)| v * v - (v - h) * (v - h));
-            made.squared_error += gain.sum::<f64>() * squared;
+        // The last ones that do not pay are left out.
+        if let Some((since, before)) = failed {
+            part = before;
+            each.truncate(since);
         }
         part.end(&mut made.parts);
-        made.components = kept;
-        for [basis, weights] in &spent_on[..kept] {
+        made.components = each.len();
+        for [basis, weights, gain] in each {
             made.basis_bits += basis;
             made.weight_bits += weights;
+            made.squared_error -= gain;
         }
     }
 
-    fn residual(
-        &self,
-        state: &State,
-        onto: &[f64],
-        directions: &[Vec<f64>],
-        q: usize,
-        length: f64,
-    ) -> Vec<f64> {
-        self.residual_with(&state.held, onto, directions, q, length)
+    /// The products of all trajectories with some directions: for each a value for every vertex.
+    fn onto(&self, directions: &[Vec<f64>]) -> Vec<Vec<f64>> {
+        let frames = self.frames();
+        let mut time = vec![0.0; directions.len() * 3 * frames];
+        let axes = time.par_chunks_mut(frames).enumerate();
+        axes.for_each(|(i, time)| {
+            let there = &directions[i / 3][i % 3 * frames..(i % 3 + 1) * frames];
+            self.cosines.inverse(there, time);
+        });
+        self.trajectories.onto(&time, &self.means)
     }
 
-    /// The weights of direction `q` that take up what the components before leave, by rank.
-    fn residual_with(
-        &self,
-        held: &[Vec<f64>],
-        onto: &[f64],
-        directions: &[Vec<f64>],
-        q: usize,
-        length: f64,
-    ) -> Vec<f64> {
-        let count = directions.len();
-        let of = |v: &u32| onto[*v as usize * count + q];
-        let mut values: Vec<f64> = self.hierarchy.vertices.iter().map(of).collect();
+    /// The weights of direction `q` that take up what the components before leave, by rank; `onto` are
+    /// the products of the trajectories with it.
+    fn left(&self, onto: &[f64], held: &[Vec<f32>], directions: &[Vec<f64>], q: usize) -> Vec<f64> {
+        let this = &directions[q];
+        let vertices = self.hierarchy.vertices.iter();
+        let mut values: Vec<f64> = vertices.map(|v| onto[*v as usize]).collect();
         for (field, direction) in held.iter().zip(directions) {
-            let common = direction.iter().zip(&directions[q]);
+            // Directions are nearly at right angles, so single precision does for the rest.
+            let common = direction.iter().zip(this);
             let common = common.fold(0.0, |sum, (x, y)| sum + x * y);
             if common != 0.0 {
                 for (value, weight) in values.iter_mut().zip(field) {
-                    *value -= common * weight;
+                    *value -= common * f64::from(*weight);
                 }
             }
         }
-        let squared = length * length;
+        let squared = length(this).powi(2);
         for value in &mut values {
             *value = if squared > 0.0 { *value / squared } else { 0.0 };
         }
@@ -591,38 +559,36 @@ pub fn decode(
     let head = Head { step, affine };
     let (mut state, shape) = begin(&mut reader, hierarchy, frames, head, None);
     reader.check()?;
-    let mut directions = Vec::new();
+    let mut counts = parts.iter().map(|part| take_number(&mut &**part));
+    let count = counts.try_fold(0u64, |sum, count| Some(sum.saturating_add(count?)));
+    let count = count
+        .filter(|count| *count <= MOST as u64)
+        .map(|count| count as usize);
+    let count = count.ok_or_else(|| damaged("parts have no sound number of components"))?;
+    let mut made = Components {
+        means: vec![[0.0; 3]; hierarchy.len()],
+        weights: vec![[0.0; LANES]; hierarchy.len().div_ceil(LANES) * count],
+        directions: Vec::with_capacity(count),
+    };
+    let root = (frames as f64).sqrt();
+    for (rank, v) in hierarchy.vertices.iter().enumerate() {
+        made.means[*v as usize] = std::array::from_fn(|axis| shape[axis][rank] / root);
+    }
     for mut part in parts.iter().copied() {
-        let count = take_number(&mut part).filter(|count| *count <= MOST as u64);
-        let count = count.ok_or_else(|| damaged("part has no number of components"))?;
+        let some = take_number(&mut part).unwrap_or(0);
         let mut reader = Reader::new(part);
-        for _ in 0..count {
+        for _ in 0..some {
             let (direction, _) = state.directions.code(&mut reader, None, None);
-            state.weights(&mut reader, length(&direction), None);
-            state.learn();
-            directions.push(direction);
-            if directions.len() > MOST {
-                return Err(damaged("components are too many"));
+            let field = state.weights(&mut reader, length(&direction), None);
+            let q = made.directions.len();
+            for (v, weight) in hierarchy.vertices.iter().map(|v| *v as usize).zip(field) {
+                made.weights[v / LANES * count + q][v % LANES] = weight;
             }
+            made.directions.push(direction);
         }
         reader.check()?;
     }
-    let root = (frames as f64).sqrt();
-    let mut means = vec![[0.0; 3]; hierarchy.len()];
-    let count = state.held.len();
-    let mut weights = vec![[0.0; LANES]; hierarchy.len().div_ceil(LANES) * count];
-    for (rank, v) in hierarchy.vertices.iter().map(|v| *v as usize).enumerate() {
-        means[v] = std::array::from_fn(|axis| shape[axis][rank] / root);
-        let rows = &mut weights[v / LANES * count..(v / LANES + 1) * count];
-        for (row, held) in rows.iter_mut().zip(&state.held) {
-            row[v % LANES] = held[rank];
-        }
-    }
-    Ok(Components {
-        means,
-        weights,
-        directions,
-    })
+    Ok(made)
 }
 
 impl Components {
