@@ -11,6 +11,7 @@ mod faces;
 mod field;
 mod hierarchy;
 mod integers;
+pub mod local;
 mod mixing;
 pub mod params;
 mod prediction;
