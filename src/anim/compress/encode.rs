@@ -4,7 +4,7 @@ use super::coder::Writer;
 use super::container::{self, Kind, push_number};
 use super::corrections;
 use super::hierarchy::Hierarchy;
-use super::params::{Method, Params, Target};
+use super::params::{Clusters, Method, Params, Target};
 use super::search::{self, Trial};
 use super::spectrum::Trajectories;
 use super::stream::{Header, Motion, edges};
@@ -31,9 +31,11 @@ pub struct Stats {
     pub method: String,
     /// Windows of frames that are told together.
     pub windows: u64,
-    /// Components of each window; empty where the method has none.
+    /// Components of each window, or of each cluster; empty where the method has none.
     pub components: Vec<u64>,
-    /// The step that numbers are rounded to, in the unit of the coordinates.
+    /// Clusters of each window; empty where the method has none.
+    pub clusters: Vec<u64>,
+    /// The step that numbers are rounded to, in the unit of the coordinates; 0 where each has its own.
     pub step: f64,
     /// Vertices of frames that are moved to keep within `--target-max`.
     pub corrected: u64,
@@ -54,6 +56,10 @@ pub struct Bits {
     pub faces: f64,
     /// The mean shape, or the first frame.
     pub shape: f64,
+    /// Which cluster each vertex is in.
+    pub labels: f64,
+    /// The points that carry frames of reference.
+    pub seeds: f64,
     /// How components move over time.
     pub basis: f64,
     /// How strong each component is at each vertex, or what changes from frame to frame.
@@ -67,11 +73,28 @@ pub struct Bits {
 }
 
 impl Bits {
+    /// Those that tell something: all but the framing.
+    pub fn told(&self) -> f64 {
+        let Bits {
+            faces,
+            shape,
+            labels,
+            seeds,
+            basis,
+            weights,
+            corrections,
+            ..
+        } = self;
+        faces + shape + labels + seeds + basis + weights + corrections
+    }
+
     /// All of them times a factor.
     pub fn scaled(self, factor: f64) -> Bits {
         Bits {
             faces: self.faces * factor,
             shape: self.shape * factor,
+            labels: self.labels * factor,
+            seeds: self.seeds * factor,
             basis: self.basis * factor,
             weights: self.weights * factor,
             corrections: self.corrections * factor,
@@ -92,19 +115,22 @@ pub struct Made {
 
 /// A window that is told.
 #[derive(Debug, Clone, Default)]
-struct Told {
-    window: Vec<u8>,
-    parts: Vec<Vec<u8>>,
-    corrections: Option<Vec<u8>>,
-    squared_error: f64,
-    bits: Bits,
-    components: Option<usize>,
-    corrected: u64,
+pub(super) struct Told {
+    pub window: Vec<u8>,
+    pub parts: Vec<Vec<u8>>,
+    pub corrections: Option<Vec<u8>>,
+    pub squared_error: f64,
+    pub bits: Bits,
+    /// Components of the window, or of each of its clusters.
+    pub components: Vec<usize>,
+    /// Numbers that tell what moves, and the mean shape or first frame.
+    pub numbers: usize,
+    pub corrected: u64,
 }
 
 impl Told {
     /// Bytes of its sections, to a byte or two.
-    fn bytes(&self) -> usize {
+    pub fn bytes(&self) -> usize {
         let sections = self.parts.iter().chain(&self.corrections);
         let sections = sections.map(|payload| container::whole(payload.len() + 1));
         container::whole(self.window.len() + 2) + sections.sum::<usize>()
@@ -114,10 +140,11 @@ impl Told {
 /// A clip that is ready to be coded, again and again.
 #[derive(Debug)]
 pub struct Encoder<'a> {
-    ground: &'a Ground,
-    header: Header,
-    method: Method,
-    windows: Vec<Trajectories<'a>>,
+    pub(super) ground: &'a Ground,
+    pub(super) header: Header,
+    pub(super) method: Method,
+    pub(super) clusters: Clusters,
+    pub(super) windows: Vec<Trajectories<'a>>,
     analyses: Vec<Analysis<'a>>,
     faces: Vec<u8>,
     face_bits: f64,
@@ -129,8 +156,9 @@ pub struct Encoder<'a> {
 /// What does not change from target to target but must outlive an [`Encoder`].
 #[derive(Debug)]
 pub struct Ground {
-    polygons: Polygons,
-    hierarchy: Hierarchy,
+    pub(super) polygons: Polygons,
+    pub(super) hierarchy: Hierarchy,
+    pub(super) triangles: Vec<[u32; 3]>,
 }
 
 impl Ground {
@@ -141,6 +169,7 @@ impl Ground {
         Ok(Ground {
             polygons,
             hierarchy,
+            triangles: mesh.triangles.clone(),
         })
     }
 }
@@ -212,8 +241,7 @@ impl<'a> Encoder<'a> {
         let windows: Vec<_> = (0..header.windows()).map(of).collect();
         progress.stage("analyse", windows.len() as u64);
         let analyses = match params.method {
-            Method::Delta => Vec::new(),
-            _ => {
+            Method::Auto | Method::Trajectory => {
                 let looked = windows.iter().map(|window| {
                     let analysis = Analysis::new(*window, &ground.hierarchy);
                     progress.advance(1);
@@ -221,12 +249,14 @@ impl<'a> Encoder<'a> {
                 });
                 looked.collect()
             }
+            _ => Vec::new(),
         };
         let norm = windows.iter().map(|w| about_centroids(w)).sum();
         Ok(Encoder {
             ground,
             header,
             method: params.method,
+            clusters: params.clusters,
             windows,
             analyses,
             faces: writer.finish(),
@@ -257,7 +287,7 @@ impl Encoder<'_> {
     }
 
     /// The squared error in local units that a target allows; none where it is not about that.
-    fn squared_error(&self, target: Target) -> Option<f64> {
+    pub(super) fn squared_error(&self, target: Target) -> Option<f64> {
         let positions = (self.header.vertices * self.header.frames) as f64;
         match target {
             Target::Kg(percent) => {
@@ -306,6 +336,9 @@ impl Encoder<'_> {
     /// trials, each of which is one pass over all components.
     pub fn make(&self, target: Target, progress: &dyn Progress) -> Result<Made> {
         progress.stage("encode", 0);
+        if self.method.space().is_some() {
+            return self.make_clustered(target, progress);
+        }
         let method = match self.method {
             Method::Auto if self.delta_is_shorter(target) => Method::Delta,
             Method::Auto => Method::Trajectory,
@@ -343,13 +376,20 @@ impl Encoder<'_> {
         Ok(self.assemble(method, best, trials))
     }
 
-    /// Errs where the best there is misses its target.
-    fn check_reached(&self, target: Target, best: &Trial<Vec<Told>>) -> Result<()> {
+    /// A squared error in local units as a target says it.
+    pub(super) fn as_target(&self, target: Target, squared_error: f64) -> f64 {
         let positions = (self.header.vertices * self.header.frames) as f64;
-        let unit = self.header.unit();
+        match target {
+            Target::Kg(_) => 100.0 * (squared_error / self.norm).sqrt(),
+            _ => self.header.unit() * (squared_error / positions).sqrt(),
+        }
+    }
+
+    /// Errs where the best there is misses its target.
+    pub(super) fn check_reached(&self, target: Target, best: &Trial<Vec<Told>>) -> Result<()> {
+        let positions = (self.header.vertices * self.header.frames) as f64;
         let reached = match target {
-            Target::Kg(_) => 100.0 * (best.squared_error / self.norm).sqrt(),
-            Target::Rmse(_) => unit * (best.squared_error / positions).sqrt(),
+            Target::Kg(_) | Target::Rmse(_) => self.as_target(target, best.squared_error),
             Target::Bpvf(_) => best.bits / positions,
             Target::Max(_) => return Ok(()),
         };
@@ -434,7 +474,9 @@ impl Encoder<'_> {
                 weights: made.weight_bits,
                 ..Bits::default()
             },
-            components: Some(made.components),
+            components: vec![made.components],
+            numbers: 3 * self.header.vertices
+                + made.components * (self.header.vertices + 3 * self.windows[number].frames()),
             ..Told::default()
         }
     }
@@ -451,12 +493,13 @@ impl Encoder<'_> {
                 weights: made.motion_bits,
                 ..Bits::default()
             },
+            numbers: 3 * self.header.vertices * window.frames(),
             ..Told::default()
         }
     }
 
     /// Adds what keeps every vertex within a bound, in local units, and measures the error.
-    fn correct(&self, number: usize, method: Method, bound: f64, told: &mut Told) {
+    pub(super) fn correct(&self, number: usize, method: Method, bound: f64, told: &mut Told) {
         let window = &self.windows[number];
         let motion = Motion::read(
             method,
@@ -487,19 +530,9 @@ impl Encoder<'_> {
         told.corrections = (encoder.count > 0).then(|| encoder.finish());
     }
 
-    /// Numbers that a window is told by.
-    fn numbers(&self, number: usize, told: &Told) -> u64 {
-        let (vertices, frames) = (self.header.vertices, self.windows[number].frames());
-        let moving = match told.components {
-            Some(components) => components * (vertices + 3 * frames),
-            None => 3 * vertices * (frames - 1),
-        };
-        (3 * vertices + moving) as u64 + 3 * told.corrected
-    }
-
     /// The stream of a trial: what all windows begin with first, then their parts in turn, so that a
     /// stream that is cut off keeps as much of each.
-    fn assemble(&self, method: Method, best: Trial<Vec<Told>>, trials: u64) -> Made {
+    pub(super) fn assemble(&self, method: Method, best: Trial<Vec<Told>>, trials: u64) -> Made {
         let mut bytes = container::begin();
         container::push(&mut bytes, Kind::Header, &self.header.write());
         container::push(&mut bytes, Kind::Faces, &self.faces);
@@ -539,27 +572,31 @@ impl Encoder<'_> {
         };
         for told in windows {
             bits.shape += told.bits.shape;
+            bits.labels += told.bits.labels;
+            bits.seeds += told.bits.seeds;
             bits.basis += told.bits.basis;
             bits.weights += told.bits.weights;
             bits.corrections += told.bits.corrections;
         }
-        let told = bits.faces + bits.shape + bits.basis + bits.weights + bits.corrections;
-        bits.framing = bits.total - told;
+        bits.framing = bits.total - bits.told();
         let unit = self.header.unit();
         let stats = Stats {
             method: method.name().to_owned(),
             windows: windows.len() as u64,
             components: windows
                 .iter()
-                .filter_map(|w| w.components)
-                .map(|c| c as u64)
+                .flat_map(|w| &w.components)
+                .map(|c| *c as u64)
+                .collect(),
+            clusters: windows
+                .iter()
+                .filter(|_| method.space().is_some())
+                .map(|w| w.components.len() as u64)
                 .collect(),
             step: best.step * unit,
             corrected: windows.iter().map(|told| told.corrected).sum(),
             bits,
-            numbers: (0..windows.len())
-                .map(|n| self.numbers(n, &windows[n]))
-                .sum(),
+            numbers: windows.iter().map(|w| w.numbers as u64 + 3 * w.corrected).sum(),
             trials,
             predicted_squared_error: best.squared_error * unit * unit,
         };

@@ -2,6 +2,7 @@
 //!
 //! wip
 
+mod clustered;
 mod coder;
 pub mod container;
 mod corrections;
@@ -21,7 +22,8 @@ pub mod stream;
 mod trajectory;
 
 pub use encode::{Bits, Encoder, Ground, Made, Stats};
-pub use params::{Method, Params, Target};
+pub use local::{Allocate, Frame};
+pub use params::{Clusters, Method, Params, Target};
 pub use stream::{Stream, Summary, is_stream, room_to_decode, summary};
 
 use crate::anim::Clip;

@@ -1,5 +1,6 @@
 //! What a stream is asked to be.
 
+use super::local::{self, Allocate, Frame};
 use crate::error::{Error, Result};
 
 /// How the motion is told.
@@ -34,6 +35,16 @@ impl Method {
     /// Lower-case name.
     pub const fn name(self) -> &'static str {
         Self::NAMES[self as usize]
+    }
+
+    /// From where clusters are seen, for the methods that have any.
+    pub fn space(self) -> Option<local::Space> {
+        match self {
+            Method::Rlpca => Some(local::Space::Relative),
+            Method::Lpca => Some(local::Space::World),
+            Method::Pca => Some(local::Space::Whole),
+            Method::Auto | Method::Trajectory | Method::Delta => None,
+        }
     }
 
     /// The method of this name.
@@ -75,6 +86,21 @@ impl Target {
     }
 }
 
+/// How clusters are made and coded, for the methods that have them.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Clusters {
+    /// How many there are; none tries several and takes what is shortest.
+    pub count: Option<usize>,
+    /// Components of every cluster, or as many in all as that makes; it stands for the target.
+    pub components: Option<usize>,
+    /// Bits of the numbers of components; none chooses them.
+    pub bits: Option<u32>,
+    /// The triangles that carry frames of reference.
+    pub frame: Frame,
+    /// How components are shared out.
+    pub allocate: Allocate,
+}
+
 /// What a stream is asked to be.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Params {
@@ -85,6 +111,8 @@ pub struct Params {
     /// Frames that are told together, at most; a range of frames is decoded from the windows that
     /// hold it.
     pub window: usize,
+    /// Clusters, for `rlpca` and `lpca`; of `pca` the components and bits.
+    pub clusters: Clusters,
 }
 
 impl Params {
@@ -93,6 +121,13 @@ impl Params {
         method: Method::Auto,
         target: Target::Kg(0.1),
         window: 256,
+        clusters: Clusters {
+            count: None,
+            components: None,
+            bits: None,
+            frame: Frame::Wide,
+            allocate: Allocate::RateDistortion,
+        },
     };
 
     /// Errs where a value is out of range.
@@ -107,6 +142,23 @@ impl Params {
                 self.window,
                 "must be between 1 and 1024",
             ));
+        }
+        let Clusters {
+            count,
+            components,
+            bits,
+            ..
+        } = self.clusters;
+        if components == Some(0) {
+            return Err(Error::parameter("components", 0, "must be 1 or more"));
+        }
+        if count == Some(0) {
+            return Err(Error::parameter("clusters", 0, "must be 1 or more"));
+        }
+        let range = 2..=local::Params::MOST_BITS;
+        if let Some(bits) = bits.filter(|bits| !range.contains(bits)) {
+            let problem = format!("must be between 2 and {}", local::Params::MOST_BITS);
+            return Err(Error::parameter("bits", bits, problem));
         }
         Ok(())
     }

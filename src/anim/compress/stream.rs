@@ -7,7 +7,7 @@ use super::hierarchy::Hierarchy;
 use super::params::Method;
 use super::spectrum::Cosines;
 use super::trajectory::{self, Components};
-use super::{delta, faces};
+use super::{delta, faces, local};
 use crate::anim::Clip;
 use crate::error::Fault;
 use crate::mesh::polygon::set_faces;
@@ -109,6 +109,8 @@ impl Header {
 pub enum Motion {
     /// Components.
     Trajectory(Components, Cosines),
+    /// Clusters.
+    Local(local::Decoded),
     /// Frames.
     Delta(Vec<Vec<Vec3>>),
 }
@@ -125,7 +127,10 @@ impl Motion {
         let parts: Vec<&[u8]> = parts.iter().map(AsRef::as_ref).collect();
         Ok(match method {
             Method::Delta => Motion::Delta(delta::decode(hierarchy, frames, window, &parts)?),
-            _ => {
+            Method::Rlpca | Method::Lpca | Method::Pca => {
+                Motion::Local(local::decode(hierarchy, frames, window, &parts)?)
+            }
+            Method::Auto | Method::Trajectory => {
                 let read = trajectory::decode(hierarchy, frames, window, &parts)?;
                 Motion::Trajectory(read, Cosines::new(frames))
             }
@@ -136,6 +141,7 @@ impl Motion {
     pub fn frame(&self, frame: usize, out: &mut [Vec3]) {
         match self {
             Motion::Trajectory(components, cosines) => components.frame(cosines, frame, out),
+            Motion::Local(clusters) => clusters.frame(frame, out),
             Motion::Delta(frames) => out.copy_from_slice(&frames[frame]),
         }
     }

@@ -145,8 +145,7 @@ fn bits_are_counted_by_what_they_tell() {
     let made = made(&clip, &params(Method::Auto, Target::Kg(0.1)));
     let bits = made.stats.bits;
     assert_eq!(bits.total, 8.0 * made.bytes.len() as f64);
-    let told = bits.faces + bits.shape + bits.basis + bits.weights + bits.corrections;
-    assert!((told + bits.framing - bits.total).abs() < 1e-6 * bits.total);
+    assert!((bits.told() + bits.framing - bits.total).abs() < 1e-6 * bits.total);
     // Framing is what heads, lengths, checksums and ends of sections take, and no more.
     let sections = summary(&made.bytes).unwrap().sections;
     let count: u64 = sections.iter().map(|s| s.count).sum();
