@@ -9,7 +9,9 @@ use crate::job::{Found, Job};
 use crate::shared::{Common, Inputs, MaxError, Output, Preview, Verify, named, positive};
 use clap::{ArgGroup, value_parser};
 use scantle::anim::Clip;
-use scantle::anim::compress::{self, Encoder, Ground, Made, Method, Params, Stream, Target};
+use scantle::anim::compress::{
+    self, Allocate, Encoder, Frame, Ground, Made, Method, Params, Stream, Target,
+};
 use scantle::error::{Error, Result};
 use scantle::io::format::{Format, Kind};
 use scantle::measure::animation_error::{AnimationError, Meter};
@@ -51,12 +53,33 @@ pub struct Args {
     #[arg(long, value_name = "B", value_parser = positive, group = "target")]
     target_bpvf: Option<f64>,
     /// How motion is told: `trajectory`, components of all trajectories with weights over the mesh;
-    /// `delta`, each frame from the one before; `auto`, the shorter of the two
+    /// `delta`, each frame from the one before; `auto`, the shorter of the two; `rlpca`, the paper's:
+    /// clusters that move with frames of reference, and components in each; `lpca`, the clusters without
+    /// frames; `pca`, components of all vertices together
     #[arg(long, default_value = Params::DEFAULT.method.name(), value_parser = named(Method::NAMES, Method::from_name))]
     method: Method,
     /// Frames that are told together, at most: what a range of frames is decoded by
     #[arg(long, value_name = "N", default_value_t = Params::DEFAULT.window as u16, value_parser = value_parser!(u16).range(1..=1024))]
     window: u16,
+    /// Clusters for `rlpca` and `lpca`: a number, or `auto` for the one of 4 to 30 that is shortest
+    #[arg(long, value_name = "N", default_value = "auto", value_parser = clusters)]
+    clusters: Count,
+    /// Components of every cluster for `rlpca`, `lpca` and `pca`, or as many in all as that makes,
+    /// instead of a target
+    #[arg(long, value_name = "L", value_parser = value_parser!(u16).range(1..), group = "target")]
+    components: Option<u16>,
+    /// Bits of the numbers of components for `rlpca`, `lpca` and `pca`, over the largest side of the
+    /// animation [default: those that suit the target, or 12 with --components]
+    #[arg(long, value_name = "Q", value_parser = value_parser!(u32).range(2..=24))]
+    bits: Option<u32>,
+    /// The triangles that carry frames of reference: `seed`, that of the mesh a cluster grew from;
+    /// `wide`, three of its vertices far apart, which tremble less
+    #[arg(long, default_value = Frame::Wide.name(), value_parser = named(Frame::NAMES, Frame::from_name))]
+    frame: Frame,
+    /// How components are shared out between clusters: `rd`, by the error that a bit takes off;
+    /// `paper`, by what a component takes off; `uniform`, the same number for each
+    #[arg(long, default_value = Allocate::RateDistortion.name(), value_parser = named(Allocate::NAMES, Allocate::from_name))]
+    allocate: Allocate,
     /// Report the whole curve of bits and errors too: a stream for each of ten errors from 0.02 to 2 %
     #[arg(long)]
     ladder: bool,
@@ -101,6 +124,16 @@ pub struct Asked {
     target_value: f64,
     /// Frames that are told together, at most.
     window: u64,
+    /// Clusters, null where several numbers are tried.
+    clusters: Option<u64>,
+    /// Components of every cluster, where they stand for a target.
+    components: Option<u64>,
+    /// Bits of the numbers of components, null where they are chosen.
+    bits: Option<u32>,
+    /// The triangles that carry frames of reference.
+    frame: String,
+    /// How components are shared out.
+    allocate: String,
 }
 
 /// What a stream became.
@@ -160,7 +193,32 @@ pub struct Rung {
     components: u64,
 }
 
+/// A number of clusters, none where several are tried.
+#[derive(Debug, Clone, Copy)]
+pub struct Count(Option<usize>);
+
+fn clusters(text: &str) -> Result<Count, String> {
+    match text.parse::<usize>() {
+        _ if text == "auto" => Ok(Count(None)),
+        Ok(count @ 1..=4096) => Ok(Count(Some(count))),
+        _ => Err("not `auto`, nor a number from 1 to 4096".to_owned()),
+    }
+}
+
 impl Args {
+    /// Errs where what is asked for has no meaning together.
+    fn check(&self) -> Result<()> {
+        let clustered = self.method.space().is_some();
+        if let Some(components) = self.components.filter(|_| !clustered) {
+            let problem = format!(
+                "--method {} finds its own components; rlpca, lpca and pca take a number of them",
+                self.method.name()
+            );
+            return Err(Error::parameter("components", components, problem));
+        }
+        Ok(())
+    }
+
     fn target(&self) -> Target {
         let Args {
             target_kg,
@@ -182,6 +240,13 @@ impl Args {
             method: self.method,
             target: self.target(),
             window: usize::from(self.window),
+            clusters: compress::Clusters {
+                count: self.clusters.0,
+                components: self.components.map(usize::from),
+                bits: self.bits,
+                frame: self.frame,
+                allocate: self.allocate,
+            },
         }
     }
 }
@@ -189,6 +254,7 @@ impl Args {
 /// Makes the stream of each input.
 pub fn run(args: &Args) -> Result<Exit> {
     let context = Context::new(&args.common)?;
+    args.check()?;
     let files = match sources::are_frames(&args.inputs.inputs) {
         true => Files::together(&args.inputs.inputs, &args.inputs.format),
         false => Files::each(&args.inputs),
@@ -248,6 +314,11 @@ fn encode(job: &mut Job, args: &Args) -> Result<Found<AnyAsked, AnyFound>> {
         target: params.target.option().to_owned(),
         target_value: params.target.value(),
         window: params.window as u64,
+        clusters: params.clusters.count.map(|count| count as u64),
+        components: params.clusters.components.map(|count| count as u64),
+        bits: params.clusters.bits,
+        frame: params.clusters.frame.name().to_owned(),
+        allocate: params.clusters.allocate.name().to_owned(),
     });
     Ok(
         Found::new(asked, AnyFound::Encode(Box::new(stats)), summary)

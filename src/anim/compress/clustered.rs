@@ -111,7 +111,10 @@ impl Encoder<'_> {
                         Goal::Bits(_) => told.squared_error,
                         _ => told.bytes() as f64,
                     };
-                    if best.as_ref().is_none_or(|best| figure(&told) < figure(best)) {
+                    if best
+                        .as_ref()
+                        .is_none_or(|best| figure(&told) < figure(best))
+                    {
                         best = Some(told);
                     }
                 }
@@ -149,13 +152,17 @@ impl Encoder<'_> {
         };
         let ground = self.ground;
         let analysis = Analysis::new(*window, &ground.triangles, &ground.hierarchy, &params)?;
-        let made = analysis.encode(goal).map_err(|floor| self.unreached(target, &floor))?;
+        let made = analysis
+            .encode(goal)
+            .map_err(|floor| self.unreached(target, &floor))?;
         let mut members = vec![0usize; analysis.clusters()];
         for label in analysis.labels() {
             members[label as usize] += 1;
         }
         let each = made.components.iter().zip(&members);
-        let numbers: usize = each.map(|(l, count)| l * (3 * count + window.frames())).sum();
+        let numbers: usize = each
+            .map(|(l, count)| l * (3 * count + window.frames()))
+            .sum();
         let seeds = match space {
             Space::Relative => 9 * made.clusters * window.frames(),
             _ => 0,

@@ -596,7 +596,10 @@ impl Encoder<'_> {
             step: best.step * unit,
             corrected: windows.iter().map(|told| told.corrected).sum(),
             bits,
-            numbers: windows.iter().map(|w| w.numbers as u64 + 3 * w.corrected).sum(),
+            numbers: windows
+                .iter()
+                .map(|w| w.numbers as u64 + 3 * w.corrected)
+                .sum(),
             trials,
             predicted_squared_error: best.squared_error * unit * unit,
         };

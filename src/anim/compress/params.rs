@@ -54,6 +54,38 @@ impl Method {
     }
 }
 
+impl Frame {
+    /// All, by name.
+    pub const NAMES: &[&str] = &["seed", "wide"];
+
+    /// Lower-case name.
+    pub const fn name(self) -> &'static str {
+        Self::NAMES[self as usize]
+    }
+
+    /// The one of this name.
+    pub fn from_name(name: &str) -> Option<Self> {
+        let all = [Frame::Seed, Frame::Wide];
+        all.into_iter().find(|frame| frame.name() == name)
+    }
+}
+
+impl Allocate {
+    /// All, by name.
+    pub const NAMES: &[&str] = &["rd", "paper", "uniform"];
+
+    /// Lower-case name.
+    pub const fn name(self) -> &'static str {
+        Self::NAMES[self as usize]
+    }
+
+    /// The one of this name.
+    pub fn from_name(name: &str) -> Option<Self> {
+        let all = [Allocate::RateDistortion, Allocate::Paper, Allocate::Uniform];
+        all.into_iter().find(|allocate| allocate.name() == name)
+    }
+}
+
 /// What decides the accuracy.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Target {

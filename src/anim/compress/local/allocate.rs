@@ -113,7 +113,11 @@ pub fn refined(curves: &[Curve], mut chosen: Vec<usize>, budget: f64) -> Vec<usi
             for (less, rate) in giver.rate[..=chosen[i]].iter().enumerate() {
                 let room = free + given - rate;
                 let loss = giver.distortion[less] - giver.distortion[chosen[i]];
-                for (j, taker) in curves.iter().enumerate().filter(|(j, c)| *j != i && !c.rate.is_empty()) {
+                for (j, taker) in curves
+                    .iter()
+                    .enumerate()
+                    .filter(|(j, c)| *j != i && !c.rate.is_empty())
+                {
                     let from = taker.rate[chosen[j]];
                     let more = taker.rate.partition_point(|rate| rate - from <= room);
                     let Some(more) = more.checked_sub(1).filter(|more| *more > chosen[j]) else {
@@ -139,7 +143,10 @@ pub fn refined(curves: &[Curve], mut chosen: Vec<usize>, budget: f64) -> Vec<usi
 }
 
 fn spent(curves: &[Curve], chosen: &[usize]) -> f64 {
-    let rates = curves.iter().zip(chosen).map(|(c, l)| c.rate.get(*l).copied().unwrap_or(0.0));
+    let rates = curves
+        .iter()
+        .zip(chosen)
+        .map(|(c, l)| c.rate.get(*l).copied().unwrap_or(0.0));
     rates.sum()
 }
 
@@ -181,7 +188,10 @@ mod tests {
             let curves: Vec<Curve> = (0..3).map(|_| random(&mut rng, true)).collect();
             let all = sums(&curves, &[8; 3]).0;
             let budget = all * rng.range(0.1, 0.9);
-            let (spent, error) = sums(&curves, &refined(&curves, within(&curves, 0, budget), budget));
+            let (spent, error) = sums(
+                &curves,
+                &refined(&curves, within(&curves, 0, budget), budget),
+            );
             assert!(spent <= budget * (1.0 + 1e-9), "{spent} of {budget}");
             let mut best = f64::INFINITY;
             for code in 0..729 {
