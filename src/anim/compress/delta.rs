@@ -8,7 +8,7 @@
 
 use super::coder::{Coder, Reader, Writer};
 use super::container::{push_number, take_f64, take_number};
-use super::field::{Fields, Wanted};
+use super::field::{self, Fields, Wanted};
 use super::hierarchy::Hierarchy;
 use super::prediction::Weights;
 use super::spectrum::Trajectories;
@@ -62,19 +62,11 @@ impl<'a> State<'a> {
         step: f64,
         given: Option<&[Vec<f64>; 3]>,
     ) -> Self {
-        let even = Weights::even(hierarchy);
-        let mut fields = Fields::new(hierarchy);
-        let last = std::array::from_fn(|axis| {
-            let wanted = Wanted {
-                values: given.map(|given| given[axis].as_slice()),
-                step,
-                price: PRICE,
-            };
-            fields.code(coder, hierarchy, &even, &wanted)
-        });
+        let given = given.map(|given| [0, 1, 2].map(|axis| given[axis].as_slice()));
+        let last = field::shape(coder, hierarchy, given, step, PRICE);
         let mut state = State {
             hierarchy,
-            weights: even,
+            weights: Weights::even(hierarchy),
             fields: Fields::new(hierarchy),
             step,
             last,

@@ -120,6 +120,31 @@ impl Fields {
     }
 }
 
+/// The three coordinates of a shape, each foreseen from those before it too; `given` are their values at
+/// each rank, none where the stream tells them.
+pub fn shape(
+    coder: &mut impl Coder,
+    hierarchy: &Hierarchy,
+    given: Option<[&[f64]; 3]>,
+    step: f64,
+    price: f64,
+) -> [Vec<f64>; 3] {
+    let even = Weights::even(hierarchy);
+    let mut fields = Fields::new(hierarchy);
+    let mut wanted = |axis: usize, weights: &Weights| {
+        let wanted = Wanted {
+            values: given.map(|given| given[axis]),
+            step,
+            price,
+        };
+        fields.code(coder, hierarchy, weights, &wanted)
+    };
+    let x = wanted(0, &even);
+    let y = wanted(1, &even.through(hierarchy, &[&x]));
+    let z = wanted(2, &even.through(hierarchy, &[&x, &y]));
+    [x, y, z]
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

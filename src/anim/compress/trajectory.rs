@@ -12,7 +12,7 @@
 
 use super::coder::{Coder, Reader, Unwritten, Writer};
 use super::container::{push_number, take_f64, take_number};
-use super::field::{Fields, Wanted};
+use super::field::{self, Fields, Wanted};
 use super::hierarchy::Hierarchy;
 use super::integers::{CLASSES, Context, Integers, class_of};
 use super::prediction::Weights;
@@ -303,18 +303,8 @@ fn begin<'a>(
     head: Head,
     given: Option<&[Vec<f64>]>,
 ) -> (State<'a>, Vec<Vec<f64>>) {
-    let even = Weights::even(hierarchy);
-    let mut fields = Fields::new(hierarchy);
-    let shape: Vec<Vec<f64>> = (0..3)
-        .map(|axis| {
-            let wanted = Wanted {
-                values: given.map(|given| given[axis].as_slice()),
-                step: head.step,
-                price: PRICE,
-            };
-            fields.code(coder, hierarchy, &even, &wanted)
-        })
-        .collect();
+    let given = given.map(|given| [0, 1, 2].map(|axis| given[axis].as_slice()));
+    let shape = field::shape(coder, hierarchy, given, head.step, PRICE).to_vec();
     let state = State {
         foresight: Foresight::new(hierarchy, head.affine, &shape),
         fields: Fields::new(hierarchy),
