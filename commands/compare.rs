@@ -5,10 +5,12 @@ use crate::exit::Exit;
 use crate::job::{Found, Job};
 use crate::shared::{Common, InputFormat, Seed, not_negative};
 use crate::words;
+use scantle::anim::Clip;
 use scantle::error::{Error, Fault, Result, number};
 use scantle::image::samples::Image;
 use scantle::io::Content;
 use scantle::io::format::{Format, Kind};
+use scantle::measure::animation_error::{AnimationError, animation_error};
 use scantle::measure::image_difference::{self, ImageDifference};
 use scantle::measure::mesh_distance::{self, MeshDifference};
 use scantle::measure::report_difference::{self, ReportDifference};
@@ -20,11 +22,13 @@ use schemars::JsonSchema;
 use serde::Serialize;
 use serde_json::Value;
 
-/// Measure how far two meshes, volumes, images or reports are from each other
+/// Measure how far two meshes, volumes, images, animations or reports are from each other
 ///
 /// Meshes: the Hausdorff distance with a proven bound, mean and root mean square distances, area
 /// and volume. Volumes of the same dimensions: the voxels that differ, and by how much. Images of
 /// the same size: the pixels that differ, the largest difference of a channel, PSNR and SSIM.
+/// Animations of as many vertices and frames (pc2, mdd, sanim): the errors of Karni and Gotsman, root
+/// mean square and largest distance, frame by frame; those of other kinds are for `compress-anim eval`.
 /// Reports, or any other JSON: what differs, each place named by its JSON pointer, and the largest
 /// relative difference of two numbers. JSON Lines are compared document by document. Of two reports
 /// of scantle, what depends on the run and not on the result is left out: the block `run`, the
@@ -39,9 +43,10 @@ pub struct Args {
     #[command(flatten)]
     format: InputFormat,
     /// Exit with 1 when they differ by more than X: for meshes the Hausdorff distance in the file's
-    /// unit, for volumes the number of voxels that differ, while another place of the grid fails, for images the largest difference of a
-    /// channel in steps of eight bits (255 is full), for reports the largest relative difference of
-    /// two numbers, |a - b| / max(|a|, |b|), while any other difference fails
+    /// unit, for volumes the number of voxels that differ, while another place of the grid fails, for
+    /// images the largest difference of a channel in steps of eight bits (255 is full), for animations
+    /// the error about the centroids in percent, for reports the largest relative difference of two
+    /// numbers, |a - b| / max(|a|, |b|), while any other difference fails
     #[arg(long, value_name = "X", value_parser = not_negative)]
     tolerance: Option<f64>,
     /// Points spread over each mesh for mean and root mean square
@@ -88,6 +93,8 @@ pub enum Stats {
     Volume(Box<VolumeDifference>),
     /// Two images.
     Image(Box<ImageDifference>),
+    /// Two animations.
+    Animation(Box<AnimationError>),
     /// Two reports, or other files of JSON.
     Report(Box<ReportDifference>),
 }
@@ -109,9 +116,9 @@ pub fn run(args: &Args) -> Result<Exit> {
             Content::Mesh(a) => meshes(job, &a, args),
             Content::Volume(a) => volumes(job, &a, args),
             Content::Image(a) => images(job, &a, args),
+            Content::Animation(a) => animations(job, &a, args),
             Content::Report(a) => reports(job, &a, args),
             Content::Molecule(_) => Err(no_measure(job, Kind::Molecule)),
-            Content::Animation(_) => Err(no_measure(job, Kind::Animation)),
         };
         Ok(found?.check("tolerance", args.tolerance))
     })
@@ -124,7 +131,7 @@ fn no_measure(job: &Job, kind: Kind) -> Error {
         "holds {} ({format}), which has no measure here",
         kind.with_article()
     );
-    let hint = "two meshes, volumes, images or reports can be compared";
+    let hint = "two meshes, volumes, images, animations or reports can be compared";
     Error::Geometry(Fault::whole(problem).with_hint(hint))
 }
 
@@ -214,6 +221,17 @@ fn images(job: &mut Job, a: &Image, args: &Args) -> Compared {
     );
     let accuracy = Measures::One(difference.accuracy());
     Ok(Found::new(params, Stats::Image(Box::new(difference)), summary).accuracy(accuracy))
+}
+
+fn animations(job: &mut Job, a: &Clip, args: &Args) -> Compared {
+    let b = job.read_animation()?;
+    let error = animation_error(a, &b)?;
+    let (summary, accuracy) = (
+        error.summary(),
+        error.accuracy("every vertex of every frame"),
+    );
+    let params = args.for_any_kind();
+    Ok(Found::new(params, Stats::Animation(Box::new(error)), summary).accuracy(accuracy))
 }
 
 fn reports(job: &mut Job, a: &[Value], args: &Args) -> Compared {

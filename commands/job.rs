@@ -134,6 +134,11 @@ impl<'a> Job<'a> {
         self.read_with(io::read_image)
     }
 
+    /// Reads the next input, which must be an animation.
+    pub fn read_animation(&mut self) -> Result<Clip> {
+        self.read_with(io::read_animation)
+    }
+
     /// Reads the next input, which must be JSON.
     pub fn read_report(&mut self) -> Result<Vec<Value>> {
         self.read_with(io::read_report)

@@ -15,7 +15,7 @@ use scantle::anim::compress::{
 use scantle::error::{Error, Result};
 use scantle::io::format::{Format, Kind};
 use scantle::measure::animation_error::{AnimationError, Meter};
-use scantle::report::{Accuracy, Measures, Modelled};
+use scantle::report::Modelled;
 use schemars::JsonSchema;
 use serde::Serialize;
 
@@ -305,7 +305,8 @@ fn encode(job: &mut Job, args: &Args) -> Result<Found<AnyAsked, AnyFound>> {
     let summary = summary(&clip, &made, &error);
     job.write_preview(|_| picture::of_stream(&clip, &made.bytes, &error, &summary));
     let stats = stats(&clip, &encoder, &made, error, ladder);
-    let (accuracy, modelled) = (accuracy(&stats.error), modelled(&clip, &made));
+    let accuracy = stats.error.accuracy(compress::TRADE.reference);
+    let modelled = modelled(&clip, &made);
     let asked = AnyAsked::Encode(Asked {
         base: args.base.clone(),
         fps: args.fps,
@@ -401,29 +402,6 @@ fn summary(clip: &Clip, made: &Made, error: &AnimationError) -> String {
         bpvf.geometry,
         bpvf.total
     )
-}
-
-/// The errors of an animation as measures; the first compares all settings.
-pub fn accuracy(error: &AnimationError) -> Measures {
-    let measure = |measure: &str, unit: &str, reached| Accuracy {
-        measure: measure.to_owned(),
-        unit: unit.to_owned(),
-        bound: None,
-        reached,
-        reference: compress::TRADE.reference.to_owned(),
-        verified: true,
-    };
-    let first = compress::TRADE.error;
-    Measures::Many(vec![
-        measure(first.name, first.unit, error.kg_centroid_percent),
-        measure("error about the means", "percent", error.kg_mean_percent),
-        measure("root mean square distance", "file unit", Some(error.rmse)),
-        measure(
-            "largest distance",
-            "file unit",
-            Some(error.max_error.distance),
-        ),
-    ])
 }
 
 /// How much of the coordinates was told.

@@ -1,12 +1,12 @@
 //! `scantle compress-anim eval`: how far one animation is from another.
 
 use super::sources::{self, Sampling};
-use super::{Asked as AnyAsked, Found as AnyFound, NAME, encode};
+use super::{Asked as AnyAsked, Found as AnyFound, NAME};
 use crate::context::{Context, Files};
 use crate::exit::Exit;
 use crate::job::{Found, Job};
 use crate::shared::{Common, InputFormat, MaxError, positive};
-use scantle::error::{Error, Fault, Result};
+use scantle::error::Result;
 use scantle::measure::animation_error::animation_error;
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -62,19 +62,9 @@ fn eval(job: &mut Job, args: &Args) -> Result<Found<AnyAsked, AnyFound>> {
     };
     let a = sources::read_one(job, sampling)?;
     let b = sources::read_one(job, sampling)?;
-    let error = animation_error(&a, &b).map_err(|error| match error {
-        Error::Geometry(Fault { problem, .. }) => {
-            sources::malformed(&args.inputs[1], Fault::whole(problem))
-        }
-        other => other,
-    })?;
-    let kg = error.kg_centroid_percent;
-    let kg = kg.map_or("no share".to_owned(), |kg| format!("{kg:.5} %"));
-    let summary = format!(
-        "error {kg}, root mean square {:.3e}, at most {:.3e} (frame {}, vertex {})",
-        error.rmse, error.max_error.distance, error.max_error.frame, error.max_error.vertex
-    );
-    let accuracy = encode::accuracy(&error);
+    let error = animation_error(&a, &b)?;
+    let summary = error.summary();
+    let accuracy = error.accuracy("every vertex of every frame");
     let asked = AnyAsked::Eval(Asked { fps: args.fps });
     Ok(Found::new(asked, AnyFound::Eval(Box::new(error)), summary)
         .accuracy(accuracy)

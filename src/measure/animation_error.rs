@@ -6,8 +6,10 @@
 //! About the mean: every vertex resting at its mean over time. What is 0 of 0 is 0.
 
 use crate::anim::Clip;
-use crate::error::{Error, Fault, Result};
+use crate::anim::compress::TRADE;
+use crate::error::{Error, Fault, Result, number};
 use crate::numeric::vector::Vec3;
+use crate::report::{Accuracy, Measures};
 use schemars::JsonSchema;
 use serde::Serialize;
 
@@ -50,6 +52,49 @@ pub struct FrameError {
     pub rms: f64,
     /// Largest distance.
     pub max: f64,
+}
+
+impl AnimationError {
+    /// The measures for a report, against what `reference` says; the first, in percent, is the one
+    /// that checks are about.
+    pub fn accuracy(&self, reference: &str) -> Measures {
+        let measure = |measure: &str, unit: &str, reached| Accuracy {
+            measure: measure.to_owned(),
+            unit: unit.to_owned(),
+            bound: None,
+            reached,
+            reference: reference.to_owned(),
+            verified: true,
+        };
+        let (first, largest) = (TRADE.error, self.max_error.distance);
+        Measures::Many(vec![
+            measure(first.name, first.unit, self.kg_centroid_percent),
+            measure("error about the means", "percent", self.kg_mean_percent),
+            measure("root mean square distance", "file unit", Some(self.rmse)),
+            measure("largest distance", "file unit", Some(largest)),
+        ])
+    }
+
+    /// The error in a line for people.
+    pub fn summary(&self) -> String {
+        let share = match self.kg_centroid_percent {
+            Some(percent) => format!("{} %", number(percent)),
+            None => "no share of a reference without extent".to_owned(),
+        };
+        let farthest = &self.max_error;
+        let mut said = format!("error {share}, root mean square {}", number(self.rmse));
+        if farthest.distance > 0.0 {
+            let Farthest {
+                distance,
+                frame,
+                vertex,
+                ..
+            } = farthest;
+            let distance = number(*distance);
+            said += &format!(", at most {distance} (frame {frame}, vertex {vertex})");
+        }
+        said
+    }
 }
 
 /// Takes the frames of an animation one after the other.
@@ -130,7 +175,9 @@ impl<'a> Meter<'a> {
 fn about_centroids(clip: &Clip, frames: std::ops::Range<usize>) -> f64 {
     let of = |f: usize| {
         let frame = clip.frame(f);
-        (0..3).map(|i| spread(frame.len(), || frame.iter().map(|p| p[i]))).sum::<f64>()
+        (0..3)
+            .map(|i| spread(frame.len(), || frame.iter().map(|p| p[i])))
+            .sum::<f64>()
     };
     frames.map(of).sum()
 }
@@ -149,7 +196,9 @@ fn spread<I: Iterator<Item = f64>>(count: usize, numbers: impl Fn() -> I) -> f64
     // From the first on, so that far places lose no digits.
     let first = numbers().next().unwrap_or(0.0);
     let mean = numbers().map(|x| x - first).sum::<f64>() / count as f64;
-    numbers().map(|x| (x - first - mean) * (x - first - mean)).sum()
+    numbers()
+        .map(|x| (x - first - mean) * (x - first - mean))
+        .sum()
 }
 
 /// How far `other` is from `reference`.
@@ -182,7 +231,12 @@ mod tests {
     fn errors_are_what_is_worked_out_by_hand() {
         // Two vertices over two frames: about centroids 4 * 1, about means 2 * (1/2 + 1/2).
         let reference = clip(
-            vec![[-1.0, 0.0, 0.0], [1.0, 0.0, 0.0], [-1.0, 1.0, 0.0], [1.0, 1.0, 0.0]],
+            vec![
+                [-1.0, 0.0, 0.0],
+                [1.0, 0.0, 0.0],
+                [-1.0, 1.0, 0.0],
+                [1.0, 1.0, 0.0],
+            ],
             2,
         );
         let mut other = reference.clone();
@@ -190,8 +244,14 @@ mod tests {
         other.positions[0][2] = 0.4;
         let error = animation_error(&reference, &other).unwrap();
         let near = |a: f64, b: f64| assert!((a - b).abs() < 1e-12, "{a} {b}");
-        near(error.kg_centroid_percent.unwrap(), 100.0 * (0.25f64 / 4.0).sqrt());
-        near(error.kg_mean_percent.unwrap(), 100.0 * (0.25f64 / 1.0).sqrt());
+        near(
+            error.kg_centroid_percent.unwrap(),
+            100.0 * (0.25f64 / 4.0).sqrt(),
+        );
+        near(
+            error.kg_mean_percent.unwrap(),
+            100.0 * (0.25f64 / 1.0).sqrt(),
+        );
         near(error.rmse, (0.25f64 / 4.0).sqrt());
         near(error.max_error.distance, 0.4);
         near(error.max_error.percent_of_diagonal.unwrap(), 20.0);
@@ -209,13 +269,18 @@ mod tests {
         let mut moved = still.clone();
         moved.positions[0][0] = 3.0;
         let error = animation_error(&still, &moved).unwrap();
-        assert_eq!((error.kg_centroid_percent, error.kg_mean_percent), (None, None));
+        assert_eq!(
+            (error.kg_centroid_percent, error.kg_mean_percent),
+            (None, None)
+        );
         assert!(animation_error(&still, &clip(vec![[2.0; 3]; 6], 2)).is_err());
     }
 
     #[test]
     fn far_places_change_nothing() {
-        let near: Vec<Vec3> = (0..40).map(|i| [(i * i % 7) as f64, (i % 5) as f64, i as f64]).collect();
+        let near: Vec<Vec3> = (0..40)
+            .map(|i| [(i * i % 7) as f64, (i % 5) as f64, i as f64])
+            .collect();
         let (a, mut b) = (clip(near.clone(), 8), clip(near, 8));
         b.positions[13][1] += 0.25;
         let far = |clip: &Clip| {
@@ -227,7 +292,9 @@ mod tests {
         };
         let here = animation_error(&a, &b).unwrap();
         let there = animation_error(&far(&a), &far(&b)).unwrap();
-        assert!((here.kg_centroid_percent.unwrap() - there.kg_centroid_percent.unwrap()).abs() < 1e-9);
+        assert!(
+            (here.kg_centroid_percent.unwrap() - there.kg_centroid_percent.unwrap()).abs() < 1e-9
+        );
         assert!((here.kg_mean_percent.unwrap() - there.kg_mean_percent.unwrap()).abs() < 1e-9);
     }
 }

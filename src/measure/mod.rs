@@ -1,7 +1,7 @@
 //! Judging results: errors between two things of one kind.
 
-mod hausdorff;
 pub mod animation_error;
+mod hausdorff;
 pub mod image_difference;
 pub mod mesh_distance;
 pub mod normal_error;
