@@ -3,8 +3,8 @@
 use super::decode::Head;
 use super::matrices::{Models, State, Steps};
 use super::modes::{Matrix, Modes};
-use super::plan::Plan;
-use super::{Analysis, Encoded, Floor, Goal, LEVELS, Params};
+use super::plan::{Costs, Plan};
+use super::{Allocate, Analysis, Encoded, Floor, Goal, LEVELS, Params, Rounding};
 use crate::anim::compress::coder::Writer;
 use crate::anim::compress::container::push_number;
 
@@ -14,6 +14,8 @@ const PART: f64 = 3000.0;
 const ENDING: f64 = 80.0;
 /// Times a plan whose error was estimated too low is made again.
 const RETRIES: usize = 8;
+/// Times a plan whose bits were estimated wrongly is made again.
+const CORRECTIONS: usize = 2;
 
 /// A stream while it grows.
 struct Growing<'a> {
@@ -98,6 +100,14 @@ impl Growing<'_> {
     }
 }
 
+impl Encoded {
+    /// Bits of all payloads together.
+    pub fn bits_taken(&self) -> f64 {
+        let parts: usize = self.parts.iter().map(Vec::len).sum();
+        8.0 * (self.window.len() + parts) as f64
+    }
+}
+
 impl Analysis<'_> {
     /// Codes the window for a goal.
     ///
@@ -108,61 +118,105 @@ impl Analysis<'_> {
     pub fn encode(&self, goal: Goal) -> Result<Encoded, Floor> {
         for level in 0..LEVELS {
             let modes = self.modes(level);
-            let complete = level + 1 == LEVELS || modes.iter().all(|modes| modes.complete);
             let enough = match goal {
                 Goal::Components(l) => modes.iter().all(|m| m.complete || m.sigmas.len() >= l),
                 _ => true,
             };
-            if !enough && !complete {
-                continue;
-            }
-            match self.at_level(modes, goal) {
-                Err(floor) if complete => return Err(floor),
-                Err(_) => {}
-                Ok(made) => return Ok(made),
+            let plan = enough.then(|| self.plan(modes, goal));
+            match plan {
+                Some(plan) if level + 1 == LEVELS || !self.wants_more(modes, &plan, goal) => {
+                    return self.at_level(modes, plan, goal);
+                }
+                _ => {}
             }
         }
-        unreachable!("the last level is complete")
+        unreachable!("the last level has all modes")
     }
 
-    /// Codes the window with these modes, if they are enough.
-    fn at_level(&self, modes: &[Modes], goal: Goal) -> Result<Encoded, Floor> {
-        let Goal::SquaredError(wanted) = goal else {
-            return Ok(self.stream(modes, &self.plan(modes, goal), goal));
-        };
-        let mut plan = self.plan(modes, goal);
-        for _ in 0..RETRIES {
-            // Where the estimate says it cannot be, the stream might still say otherwise; but not by far.
-            if plan.squared_error > 2.0 * wanted {
-                break;
-            }
-            let made = self.stream(modes, &plan, goal);
-            let ranges = matches!(plan.steps.first(), Some(Steps::Ranges { .. }));
-            if made.squared_error <= wanted || ranges && plan.taken.is_some() {
-                return Ok(made);
-            }
-            if self.params.bits.is_some() || plan.bits + 0.25 > f64::from(Params::MOST_BITS) {
-                break;
-            }
-            plan = self.plan_with(modes, &self.costs(modes), plan.bits + 0.25, goal);
+    /// Whether a plan takes all modes of some cluster that has more.
+    fn wants_more(&self, modes: &[Modes], plan: &Plan, goal: Goal) -> bool {
+        if let (Allocate::Uniform, Goal::Components(_)) = (self.params.allocate, goal) {
+            return false;
         }
-        Err(self.floor(modes, &plan, wanted))
+        let pairs = modes.iter().zip(plan.counts());
+        pairs.into_iter().any(|(modes, count)| !modes.complete && count == modes.sigmas.len())
+    }
+
+    /// Codes the window with these modes.
+    fn at_level(&self, modes: &[Modes], mut plan: Plan, goal: Goal) -> Result<Encoded, Floor> {
+        match goal {
+            Goal::Components(_) => Ok(self.stream(modes, &plan, goal)),
+            Goal::Bits(budget) => Ok(self.within_bits(modes, plan, budget)),
+            Goal::SquaredError(wanted) => {
+                for _ in 0..RETRIES {
+                    // Where the estimate says it cannot be, the stream might still say otherwise; but
+                    // not by far.
+                    if plan.squared_error > 2.0 * wanted {
+                        break;
+                    }
+                    let made = self.stream(modes, &plan, goal);
+                    let ranges = matches!(plan.steps.first(), Some(Steps::Ranges { .. }));
+                    if made.squared_error <= wanted || ranges && plan.taken.is_some() {
+                        return Ok(made);
+                    }
+                    let most = f64::from(Params::MOST_BITS);
+                    if self.params.bits.is_some() || plan.bits + 0.25 > most {
+                        break;
+                    }
+                    plan = self.plan_with(modes, &self.costs(modes), plan.bits + 0.25, goal);
+                }
+                Err(self.floor(modes, &plan, wanted))
+            }
+        }
+    }
+
+    /// Codes the window with at most so many bits.
+    ///
+    /// Estimated bits are mostly too many by some part; where the steps follow from them, what the
+    /// first stream took tells by how much.
+    fn within_bits(&self, modes: &[Modes], plan: Plan, budget: f64) -> Encoded {
+        let mut best = self.stream(modes, &plan, Goal::Bits(budget));
+        if self.params.bits.is_some() && self.params.rounding == Rounding::Balanced {
+            return best;
+        }
+        let (mut plan, mut last) = (plan, best.clone());
+        for _ in 0..CORRECTIONS {
+            let ratio = self.estimated(modes, plan.bits, &last.components) / last.bits_taken();
+            plan = self.plan(modes, Goal::Bits(budget * ratio.clamp(0.5, 4.0)));
+            last = self.stream(modes, &plan, Goal::Bits(budget));
+            if last.squared_error < best.squared_error {
+                best = last.clone();
+            }
+        }
+        best
     }
 
     /// The least error with the bits at hand, and the bits that the goal takes.
     fn floor(&self, modes: &[Modes], plan: &Plan, wanted: f64) -> Floor {
-        let costs = self.costs(modes);
-        let least = |bits: f64| {
-            let all = self.plan_with(modes, &costs, bits, Goal::SquaredError(0.0));
+        let least = |modes: &[Modes], costs: &[Costs], bits: f64| {
+            let all = self.plan_with(modes, costs, bits, Goal::SquaredError(0.0));
             all.squared_error
         };
-        let bits =
-            (plan.bits as u32 + 1..=Params::MOST_BITS).find(|b| least(f64::from(*b)) <= wanted);
-        Floor {
-            squared_error: least(plan.bits),
+        let mut floor = Floor {
+            squared_error: least(modes, &self.costs(modes), plan.bits),
             seed_squared_error: self.seed_squared_error,
-            bits,
+            bits: None,
+        };
+        if self.seed_squared_error > wanted {
+            return floor;
         }
+        // More bits may need more modes.
+        let mut more = plan.bits as u32 + 1..=Params::MOST_BITS;
+        for level in 0..LEVELS {
+            let modes = self.modes(level);
+            let costs = self.costs(modes);
+            floor.bits = more.find(|bits| least(modes, &costs, f64::from(*bits)) <= wanted);
+            if floor.bits.is_some() || modes.iter().all(|modes| modes.complete) {
+                break;
+            }
+            more = plan.bits as u32 + 1..=Params::MOST_BITS;
+        }
+        floor
     }
 
     /// Codes components in the order of a plan, up to the goal.

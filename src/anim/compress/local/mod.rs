@@ -303,6 +303,17 @@ impl<'a> Analysis<'a> {
         })
     }
 
+    /// Bits of the points of frames of reference that suit a squared error, in local units: their step
+    /// is about twice what a coordinate is then off by. Finer points cost more than they save in
+    /// components.
+    pub fn fitting_seed_bits(trajectories: &Trajectories, squared_error: f64) -> u32 {
+        let (_, side) = bounds(trajectories);
+        let off = (squared_error / (3 * trajectories.positions.len()) as f64).sqrt();
+        let bits = (side / (2.0 * off)).log2().round();
+        // Also where there is no error or no extent.
+        if bits >= 6.0 { bits.min(f64::from(Params::MOST_BITS)) as u32 } else { 6 }
+    }
+
     /// Number of clusters there are.
     pub fn clusters(&self) -> usize {
         self.matrices.len()

@@ -17,6 +17,8 @@ const SHARE: f64 = 0.1;
 pub struct Plan {
     /// The steps of each cluster.
     pub steps: Vec<Steps>,
+    /// Number of clusters.
+    clusters: usize,
     /// The cluster of each component.
     pub order: Vec<usize>,
     /// How many of them the goal takes, by estimates; none where all are not enough.
@@ -150,7 +152,7 @@ impl Analysis<'_> {
                 let (left, rounding) = self.errors(modes, &steps, rows, components);
                 curve.distortion.push(left + rounding);
                 let held = costs.spreads[..components].iter().zip(&modes.sigmas);
-                let rate = held.map(|([column, row], sigma)| {
+                let mut rate = held.map(|([column, row], sigma)| {
                     let (column_step, row_step) = match steps {
                         Steps::Even(step) => (step, step),
                         Steps::Ranges { columns, rows } => (columns * sigma, rows),
@@ -159,11 +161,12 @@ impl Analysis<'_> {
                         + self.layout.frames as f64 * entropy(row / row_step)
                         + SIDE_BITS
                 });
-                // Wider ranges must not make more components cheaper.
-                let before = curve.rate.last().map_or(0.0, |rate| rate + SIDE_BITS);
-                curve.rate.push(match components {
-                    0 => 0.0,
-                    _ => rate.sum::<f64>().max(before),
+                let before = curve.rate.last().copied();
+                curve.rate.push(match (before, steps) {
+                    (None, _) => 0.0,
+                    (Some(before), Steps::Even(_)) => before + rate.next_back().unwrap_or(0.0),
+                    // Wider ranges must not make more components cheaper.
+                    (Some(before), _) => rate.sum::<f64>().max(before + SIDE_BITS),
                 });
             }
             curve
@@ -186,6 +189,18 @@ impl Analysis<'_> {
     pub fn foretold_seeds(&self) -> f64 {
         let points = self.layout.corners.len() * 3 * self.layout.frames;
         3.0 * points as f64 * self.layout.lattice.step.powi(2) / 12.0
+    }
+
+    /// Bits that so many components of each cluster take, by estimates.
+    pub fn estimated(&self, modes: &[Modes], bits: f64, components: &[usize]) -> f64 {
+        let curves = self.curves(modes, &self.costs(modes), bits);
+        let rates = curves.iter().zip(components).map(|(curve, l)| curve.rate[*l]);
+        self.fixed_bits() + rates.sum::<f64>()
+    }
+
+    /// Bits of a window without components, about.
+    fn fixed_bits(&self) -> f64 {
+        8.0 * (self.head.len() + 64) as f64
     }
 
     /// A plan for a goal, with the bits asked for or the best ones.
@@ -257,28 +272,24 @@ impl Analysis<'_> {
             }
         };
         let mut counts = vec![0; most.len()];
-        let fixed = 8.0 * (self.head.len() + 64) as f64;
-        let mut rate = fixed;
+        let mut rate = self.fixed_bits();
         let mut error: f64 = curves.iter().map(|curve| curve.distortion[0]).sum();
         error += self.seed_squared_error;
         let mut taken = None;
         let mut at = (error, rate);
         for n in 0..=order.len() {
-            let enough = match (goal, counted) {
-                (_, Some(counted)) => n == counted,
-                (Goal::SquaredError(wanted), _) => error <= wanted,
-                (Goal::Bits(budget), _) => rate > budget,
-                (Goal::Components(_), None) => n == order.len(),
+            let (fits, enough) = match (goal, counted) {
+                (_, Some(counted)) => (true, n == counted),
+                (Goal::SquaredError(wanted), _) => (true, error <= wanted),
+                (Goal::Bits(budget), _) => (rate <= budget, n == order.len()),
+                (Goal::Components(_), None) => (true, n == order.len()),
             };
-            if enough && matches!(goal, Goal::Bits(_)) {
+            if !fits && n > 0 {
                 break;
             }
-            (at, taken) = ((error, rate), Some(n));
-            if enough {
-                break;
-            }
-            taken = matches!(goal, Goal::Bits(_)).then_some(n);
-            let Some(i) = order.get(n) else {
+            at = (error, rate);
+            taken = (enough || matches!(goal, Goal::Bits(_))).then_some(n);
+            let Some(i) = order.get(n).filter(|_| !enough && fits) else {
                 break;
             };
             let (l, curve) = (counts[*i], &curves[*i]);
@@ -288,6 +299,7 @@ impl Analysis<'_> {
         }
         let mut plan = Plan {
             steps: Vec::new(),
+            clusters: modes.len(),
             order,
             taken,
             squared_error: at.0,
@@ -304,8 +316,7 @@ impl Analysis<'_> {
 impl Plan {
     /// Components that each cluster gets.
     pub fn counts(&self) -> Vec<usize> {
-        let clusters = self.order.iter().copied().max().map_or(0, |most| most + 1);
-        let mut counts = vec![0; clusters.max(self.steps.len())];
+        let mut counts = vec![0; self.clusters];
         for i in &self.order[..self.taken.unwrap_or(self.order.len())] {
             counts[*i] += 1;
         }
@@ -340,7 +351,12 @@ fn shared_out(
     budget: impl Fn(usize) -> f64,
 ) -> (Vec<usize>, Option<usize>) {
     let chosen = match goal {
-        Goal::Components(l) => Some(allocate::within(curves, start, budget(l))),
+        Goal::Components(l) => {
+            let chosen = allocate::within(curves, start, budget(l));
+            // The paper goes along the hulls and no further.
+            let as_it_is = start > 0;
+            Some(if as_it_is { chosen } else { allocate::refined(curves, chosen, budget(l)) })
+        }
         _ => None,
     };
     let (mut order, mut counts) = (Vec::new(), vec![0; curves.len()]);
