@@ -6,7 +6,7 @@ use super::matrices::{Models, State, Steps};
 use super::pose::Pose;
 use super::tracks::Lattice;
 use crate::anim::compress::coder::Reader;
-use crate::anim::compress::container::{take_f64, take_number};
+use crate::anim::compress::container::{push_number, take_f64, take_number};
 use crate::anim::compress::hierarchy::Hierarchy;
 use crate::error::Fault;
 use crate::numeric::vector::Vec3;
@@ -25,15 +25,13 @@ pub struct Head {
 
 impl Head {
     /// Its bytes: what carries frames (0 the world, 1 a centroid, 2 triangles; and 4 where each cluster
-    /// has its own steps), the number of clusters, the lattice where there is one, the steps.
+    /// has its own steps), the number of clusters, the lattice, the steps.
     pub fn write(&self) -> Vec<u8> {
         let own = matches!(self.steps.first(), Some(Steps::Ranges { .. }));
         let mut out = vec![self.anchor as u8 | u8::from(own) << 2];
-        super::super::container::push_number(&mut out, self.steps.len() as u64);
-        if self.anchor != Anchor::World {
-            for number in self.lattice.lo.into_iter().chain([self.lattice.step]) {
-                out.extend_from_slice(&number.to_le_bytes());
-            }
+        push_number(&mut out, self.steps.len() as u64);
+        for number in self.lattice.lo.into_iter().chain([self.lattice.step]) {
+            out.extend_from_slice(&number.to_le_bytes());
         }
         for steps in &self.steps {
             match steps {
@@ -70,11 +68,9 @@ impl Head {
         let clusters = take_number(bytes).filter(|n| (1..=most as u64).contains(n));
         let clusters = clusters.ok_or_else(|| damaged("clusters are none or too many"))? as usize;
         let mut numbers = [0.0; 4];
-        if anchor != Anchor::World {
-            for number in &mut numbers {
-                let finite = take_f64(bytes).filter(|x| x.is_finite());
-                *number = finite.ok_or_else(|| damaged("lattice is not finite"))?;
-            }
+        for number in &mut numbers {
+            let finite = take_f64(bytes).filter(|x| x.is_finite());
+            *number = finite.ok_or_else(|| damaged("lattice is not finite"))?;
         }
         let [x, y, z, step] = numbers;
         let positive = |x: Option<f64>| {

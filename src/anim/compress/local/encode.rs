@@ -139,9 +139,7 @@ impl Analysis<'_> {
             return false;
         }
         let pairs = modes.iter().zip(plan.counts());
-        pairs
-            .into_iter()
-            .any(|(modes, count)| !modes.complete && count == modes.sigmas.len())
+        pairs.into_iter().any(|(modes, count)| !modes.complete && count == modes.sigmas.len())
     }
 
     /// Codes the window with these modes.

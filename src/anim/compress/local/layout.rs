@@ -11,7 +11,7 @@ use rayon::prelude::*;
 /// What a cluster's frame of reference is fixed to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Anchor {
-    /// Nothing: it is that of the world.
+    /// Nothing: it stands still at the corner of the box around everything.
     World,
     /// The centroid of all vertices; it does not turn.
     Centroid,
@@ -152,7 +152,13 @@ impl Layout {
                 .point(self.tracks[frame * count + cluster * each + i])
         };
         match self.anchor {
-            Anchor::World => vec![Pose::WORLD; self.frames],
+            Anchor::World => {
+                let pose = Pose {
+                    origin: self.lattice.lo,
+                    ..Pose::WORLD
+                };
+                vec![pose; self.frames]
+            }
             Anchor::Centroid => {
                 let at = |frame| Pose {
                     origin: point(frame, 0),

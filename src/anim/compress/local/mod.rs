@@ -311,11 +311,7 @@ impl<'a> Analysis<'a> {
         let off = (squared_error / (3 * trajectories.positions.len()) as f64).sqrt();
         let bits = (side / (2.0 * off)).log2().round();
         // Also where there is no error or no extent.
-        if bits >= 6.0 {
-            bits.min(f64::from(Params::MOST_BITS)) as u32
-        } else {
-            6
-        }
+        if bits >= 6.0 { bits.min(f64::from(Params::MOST_BITS)) as u32 } else { 6 }
     }
 
     /// Number of clusters there are.

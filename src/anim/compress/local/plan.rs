@@ -194,10 +194,7 @@ impl Analysis<'_> {
     /// Bits that so many components of each cluster take, by estimates.
     pub fn estimated(&self, modes: &[Modes], bits: f64, components: &[usize]) -> f64 {
         let curves = self.curves(modes, &self.costs(modes), bits);
-        let rates = curves
-            .iter()
-            .zip(components)
-            .map(|(curve, l)| curve.rate[*l]);
+        let rates = curves.iter().zip(components).map(|(curve, l)| curve.rate[*l]);
         self.fixed_bits() + rates.sum::<f64>()
     }
 
@@ -358,11 +355,7 @@ fn shared_out(
             let chosen = allocate::within(curves, start, budget(l));
             // The paper goes along the hulls and no further.
             let as_it_is = start > 0;
-            Some(if as_it_is {
-                chosen
-            } else {
-                allocate::refined(curves, chosen, budget(l))
-            })
+            Some(if as_it_is { chosen } else { allocate::refined(curves, chosen, budget(l)) })
         }
         _ => None,
     };
