@@ -106,7 +106,9 @@ pub fn within(curves: &[Curve], start: usize, budget: f64) -> Vec<usize> {
 /// gives some up, or none, and another takes as many as fit then. Cost: [`FEW`] ways, or for each of at
 /// most [`CHANGES`] changes the squared number of clusters times components.
 pub fn refined(curves: &[Curve], chosen: Vec<usize>, budget: f64) -> Vec<usize> {
-    let ways = curves.iter().fold(1usize, |ways, c| ways.saturating_mul(c.rate.len().max(1)));
+    let ways = curves
+        .iter()
+        .fold(1usize, |ways, c| ways.saturating_mul(c.rate.len().max(1)));
     match ways <= FEW {
         true => best_of_all(curves, chosen, budget),
         false => exchanged(curves, chosen, budget),
@@ -117,7 +119,9 @@ pub fn refined(curves: &[Curve], chosen: Vec<usize>, budget: f64) -> Vec<usize> 
 fn best_of_all(curves: &[Curve], mut best: Vec<usize>, budget: f64) -> Vec<usize> {
     let error = |chosen: &[usize]| -> f64 {
         let pairs = curves.iter().zip(chosen);
-        pairs.map(|(c, l)| c.distortion.get(*l).copied().unwrap_or(0.0)).sum()
+        pairs
+            .map(|(c, l)| c.distortion.get(*l).copied().unwrap_or(0.0))
+            .sum()
     };
     let mut least = error(&best);
     let mut chosen = vec![0; curves.len()];
@@ -147,7 +151,11 @@ fn exchanged(curves: &[Curve], mut chosen: Vec<usize>, budget: f64) -> Vec<usize
             for (less, rate) in giver.rate[..=chosen[i]].iter().enumerate() {
                 let room = free + given - rate;
                 let loss = giver.distortion[less] - giver.distortion[chosen[i]];
-                for (j, taker) in curves.iter().enumerate().filter(|(j, c)| *j != i && !c.rate.is_empty()) {
+                for (j, taker) in curves
+                    .iter()
+                    .enumerate()
+                    .filter(|(j, c)| *j != i && !c.rate.is_empty())
+                {
                     let from = taker.rate[chosen[j]];
                     let more = taker.rate.partition_point(|rate| rate - from <= room);
                     let Some(more) = more.checked_sub(1).filter(|more| *more > chosen[j]) else {
@@ -173,7 +181,10 @@ fn exchanged(curves: &[Curve], mut chosen: Vec<usize>, budget: f64) -> Vec<usize
 }
 
 fn spent(curves: &[Curve], chosen: &[usize]) -> f64 {
-    let rates = curves.iter().zip(chosen).map(|(c, l)| c.rate.get(*l).copied().unwrap_or(0.0));
+    let rates = curves
+        .iter()
+        .zip(chosen)
+        .map(|(c, l)| c.rate.get(*l).copied().unwrap_or(0.0));
     rates.sum()
 }
 

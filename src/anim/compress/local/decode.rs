@@ -151,7 +151,7 @@ pub fn decode(
     let mut states: Vec<State> = groups
         .map(|(g, steps)| State::new(g, frames, *steps))
         .collect();
-    let mut held: Vec<(Vec<Vec<f64>>, Vec<Vec<f64>>)> = vec![Default::default(); count];
+    let mut held = vec![(Vec::new(), Vec::new()); count];
     for mut part in parts.iter().copied() {
         let components = take_number(&mut part);
         let components = components.ok_or_else(|| damaged("part has no number of components"))?;

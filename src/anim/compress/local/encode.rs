@@ -116,21 +116,22 @@ impl Analysis<'_> {
     /// below it. A budget of bits below what frames and clusters take leaves no component. Cost:
     /// `V F` for each component of every cluster, and the entropy coder's.
     pub fn encode(&self, goal: Goal) -> Result<Encoded, Floor> {
-        for level in 0..LEVELS {
+        let mut level = 0;
+        loop {
             let modes = self.modes(level);
             let enough = match goal {
                 Goal::Components(l) => modes.iter().all(|m| m.complete || m.sigmas.len() >= l),
                 _ => true,
             };
-            let plan = enough.then(|| self.plan(modes, goal));
-            match plan {
-                Some(plan) if level + 1 == LEVELS || !self.wants_more(modes, &plan, goal) => {
-                    return self.at_level(modes, plan, goal);
-                }
-                _ => {}
+            level += 1;
+            if level < LEVELS && !enough {
+                continue;
+            }
+            let plan = self.plan(modes, goal);
+            if level == LEVELS || !self.wants_more(modes, &plan, goal) {
+                return self.at_level(modes, plan, goal);
             }
         }
-        unreachable!("the last level has all modes")
     }
 
     /// Whether a plan takes all modes of some cluster that has more.
@@ -139,7 +140,9 @@ impl Analysis<'_> {
             return false;
         }
         let pairs = modes.iter().zip(plan.counts());
-        pairs.into_iter().any(|(modes, count)| !modes.complete && count == modes.sigmas.len())
+        pairs
+            .into_iter()
+            .any(|(modes, count)| !modes.complete && count == modes.sigmas.len())
     }
 
     /// Codes the window with these modes.

@@ -43,7 +43,7 @@ pub struct Costs {
 
 /// Bits of a number whose mean magnitude is this, about: the entropy of a geometric source, and a sign.
 fn entropy(mean: f64) -> f64 {
-    if !(mean > 1e-9) {
+    if mean <= 1e-9 {
         return 0.0;
     }
     (1.0 + mean).log2() + mean * (1.0 + 1.0 / mean).log2() + mean / (1.0 + mean)
@@ -72,10 +72,10 @@ impl Analysis<'_> {
                 }
                 let at = |f: usize, ago: usize| f.checked_sub(ago).map_or(0.0, |f| row[f]);
                 let mut times = [0.0f64; 3];
-                for f in 0..row.len() {
-                    times[0] += row[f].abs();
-                    times[1] += (row[f] - at(f, 1)).abs();
-                    times[2] += (row[f] - 2.0 * at(f, 1) + at(f, 2)).abs();
+                for (f, x) in row.iter().enumerate() {
+                    times[0] += x.abs();
+                    times[1] += (x - at(f, 1)).abs();
+                    times[2] += (x - 2.0 * at(f, 1) + at(f, 2)).abs();
                 }
                 let time = times.into_iter().fold(f64::INFINITY, f64::min);
                 let columns = sigma * plain.min(missed) / column.len() as f64;
@@ -194,7 +194,10 @@ impl Analysis<'_> {
     /// Bits that so many components of each cluster take, by estimates.
     pub fn estimated(&self, modes: &[Modes], bits: f64, components: &[usize]) -> f64 {
         let curves = self.curves(modes, &self.costs(modes), bits);
-        let rates = curves.iter().zip(components).map(|(curve, l)| curve.rate[*l]);
+        let rates = curves
+            .iter()
+            .zip(components)
+            .map(|(curve, l)| curve.rate[*l]);
         self.fixed_bits() + rates.sum::<f64>()
     }
 
@@ -355,7 +358,11 @@ fn shared_out(
             let chosen = allocate::within(curves, start, budget(l));
             // The paper goes along the hulls and no further.
             let as_it_is = start > 0;
-            Some(if as_it_is { chosen } else { allocate::refined(curves, chosen, budget(l)) })
+            Some(if as_it_is {
+                chosen
+            } else {
+                allocate::refined(curves, chosen, budget(l))
+            })
         }
         _ => None,
     };

@@ -25,14 +25,14 @@ impl Pose {
         let origin = scale(add(a, b), 0.5);
         let along = sub(b, a);
         let long = length(along);
-        if !(long > 0.0) {
+        if long == 0.0 {
             return None;
         }
         let x = scale(along, 1.0 / long);
         let g = sub(c, origin);
         let aside = sub(g, scale(x, dot(g, x)));
         let wide = length(aside);
-        if !(wide > 1e-12 * (long + length(g))) {
+        if wide <= 1e-12 * (long + length(g)) {
             return None;
         }
         // Once more, so that y is at right angles to x even where the triangle is thin.
