@@ -7,10 +7,12 @@ use crate::context::{Context, Files};
 use crate::exit::Exit;
 use crate::job::{Found, Job};
 use crate::shared::{Common, Inputs, MaxError, Output, Preview, Verify, named, positive};
+use crate::table::short;
+use crate::words;
 use clap::{ArgGroup, value_parser};
 use scantle::anim::Clip;
 use scantle::anim::compress::{self, Encoder, Ground, Made, Method, Params, Stream, Target};
-use scantle::error::{Error, Result};
+use scantle::error::{Error, Result, number};
 use scantle::io::format::{Format, Kind};
 use scantle::measure::animation_error::{AnimationError, Meter};
 use scantle::report::Modelled;
@@ -224,11 +226,7 @@ fn encode(job: &mut Job, args: &Args) -> Result<Found<AnyAsked, AnyFound>> {
     if let Target::Max(bound) = params.target
         && error.max_error.distance > bound
     {
-        let problem = format!(
-            "cannot be reached: coordinates as large as these are rounded by more; {:e} is",
-            error.max_error.distance
-        );
-        return Err(Error::parameter("target-max", bound, problem));
+        return Err(out_of_reach(&clip, bound));
     }
     let ladder = if args.ladder {
         ladder(&clip, &encoder, job)?
@@ -256,6 +254,17 @@ fn encode(job: &mut Job, args: &Args) -> Result<Found<AnyAsked, AnyFound>> {
             .modelled(modelled)
             .check("max-error", args.max_error.max_error),
     )
+}
+
+/// The error of a bound below what coordinates are held to.
+fn out_of_reach(clip: &Clip, bound: f64) -> Error {
+    let bounds = clip.bounds();
+    let corners = bounds.lo.iter().chain(&bounds.hi);
+    let largest = corners.fold(0.0f64, |most, c| most.max(c.abs()));
+    let (spacing, largest) = (number(largest.next_up() - largest), number(largest));
+    let problem =
+        format!("cannot be reached: coordinates up to {largest} are held to {spacing} at the best");
+    Error::parameter("target-max", number(bound), problem)
 }
 
 /// The error of what a stream decodes to.
@@ -322,11 +331,10 @@ fn stats(
 fn summary(clip: &Clip, made: &Made, error: &AnimationError) -> String {
     let bpvf = bpvf(clip, made);
     let kg = error.kg_centroid_percent;
-    let kg = kg.map_or("no share".to_owned(), |kg| format!("{kg:.4} %"));
+    let kg = kg.map_or("no share".to_owned(), |kg| format!("{} %", short(kg)));
     format!(
-        "{} frames of {} vertices in {} bytes: {:.3} bits per vertex and frame, {:.3} with the faces, error {kg}",
-        clip.frames(),
-        clip.vertices(),
+        "{} in {} bytes: {:.3} bits per vertex and frame, {:.3} with the faces, error {kg}",
+        words::frames(clip.frames() as u64, clip.vertices() as u64),
         made.bytes.len(),
         bpvf.geometry,
         bpvf.total
