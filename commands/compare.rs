@@ -227,7 +227,7 @@ fn animations(job: &mut Job, a: &Clip, args: &Args) -> Compared {
     let b = job.read_animation()?;
     let error = animation_error(a, &b)?;
     let (summary, accuracy) = (
-        error.summary(),
+        words::animation_error(&error),
         error.accuracy("every vertex of every frame"),
     );
     let params = args.for_any_kind();

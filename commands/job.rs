@@ -109,6 +109,14 @@ impl<'a> Job<'a> {
         }
     }
 
+    /// The error of a place that the result cannot go to.
+    pub fn wrong_output(&self, problem: impl Into<String>) -> Error {
+        match &self.output {
+            Some(target) => target.wrong(problem),
+            None => Error::parameter("output", "", problem),
+        }
+    }
+
     /// Reads the next input.
     pub fn read(&mut self) -> Result<Content> {
         self.read_with(io::read)

@@ -1,5 +1,7 @@
 //! Figures put into words for people, and into JSON for programs.
 
+use crate::table::short;
+use scantle::measure::animation_error::AnimationError;
 use scantle::report::{Content, Input, Output, Warning};
 use serde::Serialize;
 use std::fmt::Write;
@@ -50,6 +52,32 @@ pub fn content(content: &Content) -> String {
 /// `1 vertex`, `8 vertices`.
 pub fn counted(count: u64, one: &str, many: &str) -> String {
     format!("{count} {}", if count == 1 { one } else { many })
+}
+
+/// How many frames of how many vertices.
+pub fn frames(frames: u64, vertices: u64) -> String {
+    let [frames, vertices] = [
+        (frames, "frame", "frames"),
+        (vertices, "vertex", "vertices"),
+    ]
+    .map(|(count, one, many)| counted(count, one, many));
+    format!("{frames} of {vertices}")
+}
+
+/// How far an animation is from another.
+pub fn animation_error(error: &AnimationError) -> String {
+    let share = match error.kg_centroid_percent {
+        Some(percent) => format!("{} %", short(percent)),
+        None => "no share of a reference without extent".to_owned(),
+    };
+    let (rmse, farthest) = (short(error.rmse), &error.max_error);
+    let mut said = format!("error {share}, root mean square {rmse}");
+    if farthest.distance > 0.0 {
+        let distance = short(farthest.distance);
+        let (frame, vertex) = (farthest.frame, farthest.vertex);
+        said += &format!(", at most {distance} (frame {frame}, vertex {vertex})");
+    }
+    said
 }
 
 /// A word from a file, short and without what a terminal takes for a command.

@@ -1,15 +1,21 @@
 //! Fixtures of animations are what the formulas make, and are read as what they are.
 //!
-//! `UPDATE_FIXTURES=1 cargo test animations` writes them anew.
+//! `UPDATE_FIXTURES=1 cargo test animations` writes them anew, but for streams, which stay as they were
+//! written first: they hold the readers to the format. One that is not there is made.
 
 use crate::support::{Workplace, files_below, root, updating};
 use scantle::anim::Clip;
+use scantle::anim::compress::container::{self, Kind};
+use scantle::anim::compress::stream::Header;
+use scantle::anim::compress::{Encoder, Ground, Params, Target, summary};
 use scantle::error::Result;
 use scantle::io::format::Format;
 use scantle::io::sink::Sink;
 use scantle::io::source::Source;
 use scantle::io::{self, sequence};
+use scantle::measure::animation_error::animation_error;
 use scantle::mesh::{Mesh, shapes};
+use scantle::progress::Silent;
 use serde_json::{Value, json};
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -89,6 +95,7 @@ const FILES: &[Row] = &[
     ("animations/one-frame.pc2", || {
         bytes_of(&wave(1), Format::Pc2)
     }),
+    ("animations/resting.glb", resting),
     ("animations/static.pc2", || bytes_of(&still(), Format::Pc2)),
     ("malformed/pc2-nan.pc2", || {
         // Frame 2, vertex 1, y.
@@ -135,6 +142,120 @@ const FILES: &[Row] = &[
     }),
 ];
 
+/// Streams: what each is of, and the error that it was made to.
+const STREAMS: &[(&str, fn() -> Clip, Target)] = &[
+    ("animations/wave.sanim", || wave(FRAMES), Target::Kg(0.1)),
+    ("animations/bar.sanim", sampled_bar, Target::Max(0.001)),
+];
+
+/// The bar at thirty frames a second.
+fn sampled_bar() -> Clip {
+    let source = open("animations/bar-skin.glb");
+    let read = io::read_gltf_clip(&source, None, 30.0, None);
+    read.expect("an animation").0
+}
+
+fn stream_of(clip: &Clip, target: Target) -> Vec<u8> {
+    let params = Params {
+        target,
+        ..Params::DEFAULT
+    };
+    let ground = Ground::new(&clip.mesh).expect("a mesh");
+    let encoder = Encoder::new(clip, &ground, &params, &Silent).expect("a clip");
+    let made = encoder.make(target, &Silent);
+    made.expect("an error that can be reached").bytes
+}
+
+/// The stream of the wave.
+fn stream() -> Vec<u8> {
+    fs::read(fixture("animations/wave.sanim")).expect("a fixture")
+}
+
+/// The stream with a byte in the middle of the first payload of a kind turned over.
+fn flipped(kind: Kind) -> Vec<u8> {
+    let mut bytes = stream();
+    let (from, section) = find(&bytes, kind);
+    // Four bytes of checksum stand behind the payload.
+    bytes[from + section.1 - 4 - section.0 / 2] ^= 0x10;
+    bytes
+}
+
+/// Where the first section of a kind begins, the length of its payload, and its own.
+fn find(bytes: &[u8], kind: Kind) -> (usize, (usize, usize)) {
+    let sections = container::parse(bytes).expect("a stream").list;
+    let at = sections.iter().position(|section| section.kind == kind);
+    let at = at.expect("a section of this kind");
+    let before: usize = sections[..at].iter().map(|section| section.whole).sum();
+    let lengths = (sections[at].payload.len(), sections[at].whole);
+    (container::MAGIC.len() + 1 + before, lengths)
+}
+
+/// The stream as far as it goes before the middle of the first section of a kind.
+fn cut_in(kind: Kind) -> Vec<u8> {
+    let mut bytes = stream();
+    let (from, (_, whole)) = find(&bytes, kind);
+    bytes.truncate(from + whole / 2);
+    bytes
+}
+
+/// The stream with another header, whose checksum is right.
+fn claiming(vertices: usize) -> Vec<u8> {
+    let bytes = stream();
+    let header = Header {
+        vertices,
+        frames: FRAMES,
+        faces: 64,
+        window: FRAMES,
+        rate: 24.0,
+        start: 0.0,
+        origin: [0.0; 3],
+        exponent: 0,
+    };
+    let mut out = container::begin();
+    container::push(&mut out, Kind::Header, &header.write());
+    let (from, _) = find(&bytes, Kind::Faces);
+    out.extend_from_slice(&bytes[from..]);
+    out
+}
+
+/// Files whose bytes follow from the stream of the wave.
+const OF_THE_STREAM: &[Row] = &[
+    ("animations/cut.sanim", || cut_in(Kind::Part)),
+    ("animations/claims.sanim", || claiming(1 << 30)),
+    ("malformed/sanim-not.sanim", || b"SANIMATION".to_vec()),
+    ("malformed/sanim-short.sanim", || b"SANIM".to_vec()),
+    ("malformed/sanim-other.sanim", || b"SAMIN\x01".to_vec()),
+    ("malformed/sanim-version.sanim", || {
+        let mut bytes = stream();
+        bytes[container::MAGIC.len()] = 2;
+        bytes
+    }),
+    ("malformed/sanim-header.sanim", || flipped(Kind::Header)),
+    ("malformed/sanim-faces.sanim", || flipped(Kind::Faces)),
+    ("malformed/sanim-window.sanim", || flipped(Kind::Window)),
+    ("malformed/sanim-part.sanim", || flipped(Kind::Part)),
+    ("malformed/sanim-head.sanim", || {
+        let mut bytes = stream();
+        let (from, _) = find(&bytes, Kind::Window);
+        bytes[from + 1] ^= 1;
+        bytes
+    }),
+    ("malformed/sanim-cut.sanim", || cut_in(Kind::Window)),
+    ("malformed/sanim-trailing.sanim", || {
+        [stream(), b"more".to_vec()].concat()
+    }),
+    ("malformed/sanim-vertices.sanim", || claiming(1 << 40)),
+];
+
+/// A cube that rests, in a file that could hold what moves.
+fn resting() -> Vec<u8> {
+    let place = Workplace::new();
+    let path = place.path("a.glb");
+    let cube = shapes::cuboid([0.0; 3], [1.0; 3]);
+    io::write_mesh(&cube, &Sink::File(path.clone()), Format::Glb).expect("a file");
+    fs::read(path).expect("the file")
+}
+
 fn fixture(name: &str) -> PathBuf {
     root().join("fixtures").join(name)
 }
@@ -148,11 +269,12 @@ fn keep(path: &Path, bytes: Vec<u8>) {
 fn write_meshes() -> Result<()> {
     let obj = fixture("animations/wave.obj");
     io::write_mesh(&wave(1).mesh, &Sink::File(obj), Format::Obj)?;
-    for (folder, frames) in [("frames", 5), ("changing", 3)] {
+    for (folder, frames) in [("frames", 5), ("changing", 3), ("gap", 4)] {
         let folder = fixture("animations").join(folder);
         let word = format!("{}/", folder.display());
         sequence::write(&wave(frames), &word, Format::Obj)?;
     }
+    fs::remove_file(fixture("animations/gap/frame2.obj")).expect("a file less");
     let last = fixture("animations/changing/frame2.obj");
     let mut mesh = wave(3).mesh_at(2);
     mesh.positions.pop();
@@ -168,7 +290,12 @@ fn fixtures_are_what_the_formulas_make() {
         write_meshes().expect("meshes");
         keep(&fixture("animations/bar-skin.glb"), bar());
     }
-    for (name, make) in FILES {
+    for (name, make, target) in STREAMS {
+        if updating("UPDATE_FIXTURES") && !fixture(name).exists() {
+            keep(&fixture(name), stream_of(&make(), *target));
+        }
+    }
+    for (name, make) in FILES.iter().chain(OF_THE_STREAM) {
         if updating("UPDATE_FIXTURES") {
             keep(&fixture(name), make());
         }
@@ -184,6 +311,26 @@ fn fixtures_are_what_the_formulas_make() {
 fn open(name: &str) -> Source {
     let path = fixture(name);
     Source::open(path.to_str().expect("a name"), u64::MAX).expect("a fixture")
+}
+
+#[test]
+fn streams_of_old_are_read_to_within_their_error() {
+    for (name, make, target) in STREAMS {
+        let bytes = fs::read(fixture(name)).expect("a fixture");
+        let told = summary(&bytes).expect("a stream");
+        assert_eq!((told.version, told.cut_off_at), (1, None), "{name}");
+        let (clip, ..) = io::read_animation(&open(name), None).expect("an animation");
+        let wanted = make();
+        assert_eq!(clip.mesh.triangles, wanted.mesh.triangles, "{name}");
+        assert_eq!((clip.start, clip.rate), (wanted.start, wanted.rate));
+        let error = animation_error(&wanted, &clip).expect("as many of all");
+        let (reached, most) = match target {
+            Target::Kg(most) => (error.kg_centroid_percent.expect("an extent"), *most),
+            Target::Max(most) => (error.max_error.distance, *most),
+            other => panic!("{name} is made to {other:?}"),
+        };
+        assert!(reached > 0.0 && reached <= most, "{name}: {reached}");
+    }
 }
 
 #[test]

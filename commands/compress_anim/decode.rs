@@ -7,10 +7,11 @@ use crate::destination::FRAME;
 use crate::exit::Exit;
 use crate::job::{Found, Job};
 use crate::shared::{Common, Inputs, Output};
+use crate::words;
 use scantle::anim::Clip;
 use scantle::anim::compress::{self, Stream, summary};
-use scantle::error::Result;
-use scantle::io::format::Kind;
+use scantle::error::{Error, Result};
+use scantle::io::format::{Format, Kind};
 use scantle::report::Modelled;
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -68,6 +69,23 @@ fn frames(text: &str) -> Result<Frames, String> {
     }
 }
 
+impl Frames {
+    /// The range, of which all frames must be there.
+    fn among(self, all: usize) -> Result<Range<usize>> {
+        let range = self.from..self.to.unwrap_or(all);
+        if range.start < all && range.end <= all {
+            return Ok(range);
+        }
+        let to = self.to.map_or(String::new(), |to| to.to_string());
+        let problem = match all {
+            1 => "there is only frame 0".to_owned(),
+            _ => format!("there are only the frames from 0 to {}", all - 1),
+        };
+        let value = format!("{}:{to}", self.from);
+        Err(Error::parameter("frames", value, problem))
+    }
+}
+
 /// What was asked for.
 #[derive(Debug, Serialize, JsonSchema)]
 pub struct Asked {
@@ -98,16 +116,11 @@ pub fn run(args: &Args) -> Result<Exit> {
 }
 
 fn decode(job: &mut Job, args: &Args) -> Result<Found<AnyAsked, AnyFound>> {
-    let kinds = match job.is_pattern(FRAME) {
-        true => [Kind::Mesh].as_slice(),
-        false => &[Kind::Animation, Kind::Mesh],
-    };
-    job.expect_output(kinds)?;
+    expect_output(job)?;
     let (bytes, word) = sources::read_stream(job)?;
     let told = summary(&bytes).map_err(|fault| malformed(&word, fault))?;
     let all = told.frames as usize;
-    let asked = args.frames.unwrap_or(Frames { from: 0, to: None });
-    let range = asked.from..asked.to.unwrap_or(all);
+    let range = args.frames.map_or(Ok(0..all), |asked| asked.among(all))?;
     let count = range.len();
     job.expect_room(
         "decoding the stream",
@@ -129,7 +142,13 @@ fn decode(job: &mut Job, args: &Args) -> Result<Found<AnyAsked, AnyFound>> {
         faces: clip.mesh.face_count() as u64,
         rate: clip.rate,
     };
-    let summary = format!("{count} of {all} frames of {} vertices", stats.vertices);
+    let summary = {
+        let some = words::frames(stats.frames, stats.vertices);
+        match count == all {
+            true => some,
+            false => format!("{some}, from frame {} of {all}", range.start),
+        }
+    };
     let asked = AnyAsked::Decode(Asked {
         frames: [range.start as u64, range.end as u64],
     });
@@ -142,6 +161,21 @@ fn decode(job: &mut Job, args: &Args) -> Result<Found<AnyAsked, AnyFound>> {
         bytes.len() as u64,
     );
     Ok(Found::new(asked, AnyFound::Decode(stats), summary).modelled(modelled))
+}
+
+/// Refuses, before any work, an output that holds no animation.
+fn expect_output(job: &Job) -> Result<()> {
+    if job.is_pattern(FRAME) {
+        return job.expect_output(&[Kind::Mesh]);
+    }
+    job.expect_output(&[Kind::Animation, Kind::Mesh])?;
+    match job.output_format().filter(|f| f.kind() == Kind::Mesh) {
+        // The only meshes that hold more than one frame.
+        None | Some(Format::Gltf | Format::Glb) => Ok(()),
+        Some(_) => Err(job.wrong_output(format!(
+            "holds one mesh; for a file for each frame the name must have {FRAME} in it"
+        ))),
+    }
 }
 
 /// The number of a frame, as wide as that of the last.

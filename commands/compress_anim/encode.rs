@@ -7,12 +7,14 @@ use crate::context::{Context, Files};
 use crate::exit::Exit;
 use crate::job::{Found, Job};
 use crate::shared::{Common, Inputs, MaxError, Output, Preview, Verify, named, positive};
+use crate::table::short;
+use crate::words;
 use clap::{ArgGroup, value_parser};
 use scantle::anim::Clip;
 use scantle::anim::compress::{
-    self, Allocate, Encoder, Frame, Ground, Made, Method, Params, Stream, Target,
+    self, Allocate, Encoder, Frame, Ground, Made, Method, Params, Rounding, Stream, Target,
 };
-use scantle::error::{Error, Result};
+use scantle::error::{Error, Result, number};
 use scantle::io::format::{Format, Kind};
 use scantle::measure::animation_error::{AnimationError, Meter};
 use scantle::report::Modelled;
@@ -80,6 +82,10 @@ pub struct Args {
     /// `paper`, by what a component takes off; `uniform`, the same number for each
     #[arg(long, default_value = Allocate::RateDistortion.name(), value_parser = named(Allocate::NAMES, Allocate::from_name))]
     allocate: Allocate,
+    /// How numbers of components are rounded: `balanced`, all to make the same error; `ranges`, as in the
+    /// paper, each cluster's over their range
+    #[arg(long, default_value = Rounding::Balanced.name(), value_parser = named(Rounding::NAMES, Rounding::from_name))]
+    rounding: Rounding,
     /// Report the whole curve of bits and errors too: a stream for each of ten errors from 0.02 to 2 %
     #[arg(long)]
     ladder: bool,
@@ -134,6 +140,8 @@ pub struct Asked {
     frame: String,
     /// How components are shared out.
     allocate: String,
+    /// How numbers of components are rounded.
+    rounding: String,
 }
 
 /// What a stream became.
@@ -246,6 +254,7 @@ impl Args {
                 bits: self.bits,
                 frame: self.frame,
                 allocate: self.allocate,
+                rounding: self.rounding,
             },
         }
     }
@@ -290,11 +299,7 @@ fn encode(job: &mut Job, args: &Args) -> Result<Found<AnyAsked, AnyFound>> {
     if let Target::Max(bound) = params.target
         && error.max_error.distance > bound
     {
-        let problem = format!(
-            "cannot be reached: coordinates as large as these are rounded by more; {:e} is",
-            error.max_error.distance
-        );
-        return Err(Error::parameter("target-max", bound, problem));
+        return Err(out_of_reach(&clip, bound));
     }
     let ladder = if args.ladder {
         ladder(&clip, &encoder, job)?
@@ -320,6 +325,7 @@ fn encode(job: &mut Job, args: &Args) -> Result<Found<AnyAsked, AnyFound>> {
         bits: params.clusters.bits,
         frame: params.clusters.frame.name().to_owned(),
         allocate: params.clusters.allocate.name().to_owned(),
+        rounding: params.clusters.rounding.name().to_owned(),
     });
     Ok(
         Found::new(asked, AnyFound::Encode(Box::new(stats)), summary)
@@ -327,6 +333,17 @@ fn encode(job: &mut Job, args: &Args) -> Result<Found<AnyAsked, AnyFound>> {
             .modelled(modelled)
             .check("max-error", args.max_error.max_error),
     )
+}
+
+/// The error of a bound below what coordinates are held to.
+fn out_of_reach(clip: &Clip, bound: f64) -> Error {
+    let bounds = clip.bounds();
+    let corners = bounds.lo.iter().chain(&bounds.hi);
+    let largest = corners.fold(0.0f64, |most, c| most.max(c.abs()));
+    let (spacing, largest) = (number(largest.next_up() - largest), number(largest));
+    let problem =
+        format!("cannot be reached: coordinates up to {largest} are held to {spacing} at the best");
+    Error::parameter("target-max", number(bound), problem)
 }
 
 /// The error of what a stream decodes to.
@@ -393,11 +410,10 @@ fn stats(
 fn summary(clip: &Clip, made: &Made, error: &AnimationError) -> String {
     let bpvf = bpvf(clip, made);
     let kg = error.kg_centroid_percent;
-    let kg = kg.map_or("no share".to_owned(), |kg| format!("{kg:.4} %"));
+    let kg = kg.map_or("no share".to_owned(), |kg| format!("{} %", short(kg)));
     format!(
-        "{} frames of {} vertices in {} bytes: {:.3} bits per vertex and frame, {:.3} with the faces, error {kg}",
-        clip.frames(),
-        clip.vertices(),
+        "{} in {} bytes: {:.3} bits per vertex and frame, {:.3} with the faces, error {kg}",
+        words::frames(clip.frames() as u64, clip.vertices() as u64),
         made.bytes.len(),
         bpvf.geometry,
         bpvf.total

@@ -6,6 +6,7 @@ use crate::context::{Context, Files};
 use crate::exit::Exit;
 use crate::job::{Found, Job};
 use crate::shared::{Common, InputFormat, MaxError, positive};
+use crate::words;
 use scantle::error::Result;
 use scantle::measure::animation_error::animation_error;
 use schemars::JsonSchema;
@@ -63,7 +64,7 @@ fn eval(job: &mut Job, args: &Args) -> Result<Found<AnyAsked, AnyFound>> {
     let a = sources::read_one(job, sampling)?;
     let b = sources::read_one(job, sampling)?;
     let error = animation_error(&a, &b)?;
-    let summary = error.summary();
+    let summary = words::animation_error(&error);
     let accuracy = error.accuracy("every vertex of every frame");
     let asked = AnyAsked::Eval(Asked { fps: args.fps });
     Ok(Found::new(asked, AnyFound::Eval(Box::new(error)), summary)

@@ -6,6 +6,7 @@ use crate::context::{Context, Files};
 use crate::exit::Exit;
 use crate::job::{Found, Job};
 use crate::shared::{Common, Inputs};
+use crate::words;
 use scantle::anim::compress::summary;
 use scantle::error::Result;
 
@@ -38,10 +39,9 @@ fn info(job: &mut Job) -> Result<Found<AnyAsked, AnyFound>> {
     let (bytes, word) = sources::read_stream(job)?;
     let told = summary(&bytes).map_err(|fault| malformed(&word, fault))?;
     let mut text = format!(
-        "version {}, {} frames of {} vertices by {}",
+        "version {}, {} by {}",
         told.version,
-        told.frames,
-        told.vertices,
+        words::frames(told.frames, told.vertices),
         told.methods.join(", ")
     );
     if let Some(at) = told.cut_off_at {

@@ -7,7 +7,7 @@
 
 use crate::anim::Clip;
 use crate::anim::compress::TRADE;
-use crate::error::{Error, Fault, Result, number};
+use crate::error::{Error, Fault, Result};
 use crate::numeric::vector::Vec3;
 use crate::report::{Accuracy, Measures};
 use schemars::JsonSchema;
@@ -73,27 +73,6 @@ impl AnimationError {
             measure("root mean square distance", "file unit", Some(self.rmse)),
             measure("largest distance", "file unit", Some(largest)),
         ])
-    }
-
-    /// The error in a line for people.
-    pub fn summary(&self) -> String {
-        let share = match self.kg_centroid_percent {
-            Some(percent) => format!("{} %", number(percent)),
-            None => "no share of a reference without extent".to_owned(),
-        };
-        let farthest = &self.max_error;
-        let mut said = format!("error {share}, root mean square {}", number(self.rmse));
-        if farthest.distance > 0.0 {
-            let Farthest {
-                distance,
-                frame,
-                vertex,
-                ..
-            } = farthest;
-            let distance = number(*distance);
-            said += &format!(", at most {distance} (frame {frame}, vertex {vertex})");
-        }
-        said
     }
 }
 

@@ -148,6 +148,7 @@ impl Encoder<'_> {
             seed_bits,
             frame: chosen.frame,
             allocate: chosen.allocate,
+            rounding: chosen.rounding,
             ..local::Params::DEFAULT
         };
         let ground = self.ground;

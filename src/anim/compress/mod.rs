@@ -22,7 +22,7 @@ pub mod stream;
 mod trajectory;
 
 pub use encode::{Bits, Encoder, Ground, Made, Stats};
-pub use local::{Allocate, Frame};
+pub use local::{Allocate, Frame, Rounding};
 pub use params::{Clusters, Method, Params, Target};
 pub use stream::{Stream, Summary, is_stream, room_to_decode, summary};
 

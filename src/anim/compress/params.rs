@@ -1,6 +1,6 @@
 //! What a stream is asked to be.
 
-use super::local::{self, Allocate, Frame};
+use super::local::{self, Allocate, Frame, Rounding};
 use crate::error::{Error, Result};
 
 /// How the motion is told.
@@ -86,6 +86,22 @@ impl Allocate {
     }
 }
 
+impl Rounding {
+    /// All, by name.
+    pub const NAMES: &[&str] = &["balanced", "ranges"];
+
+    /// Lower-case name.
+    pub const fn name(self) -> &'static str {
+        Self::NAMES[self as usize]
+    }
+
+    /// The one of this name.
+    pub fn from_name(name: &str) -> Option<Self> {
+        let all = [Rounding::Balanced, Rounding::Ranges];
+        all.into_iter().find(|rounding| rounding.name() == name)
+    }
+}
+
 /// What decides the accuracy.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Target {
@@ -131,6 +147,8 @@ pub struct Clusters {
     pub frame: Frame,
     /// How components are shared out.
     pub allocate: Allocate,
+    /// How numbers of components are rounded.
+    pub rounding: Rounding,
 }
 
 /// What a stream is asked to be.
@@ -159,6 +177,7 @@ impl Params {
             bits: None,
             frame: Frame::Wide,
             allocate: Allocate::RateDistortion,
+            rounding: Rounding::Balanced,
         },
     };
 
