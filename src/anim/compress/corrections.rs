@@ -62,7 +62,7 @@ impl Corrections {
                 continue;
             }
             count += 1;
-            let mut size = 0.0f64;
+            let mut size = 0.0f32;
             for axis in 0..3 {
                 let wanted = apart.map_or(0.0, |apart| (apart[axis] / self.step).round());
                 let context = Context {
@@ -70,7 +70,7 @@ impl Corrections {
                     set: 0,
                 };
                 let number = self.numbers.code(coder, &context, wanted as i32);
-                size += f64::from(number).abs();
+                size += (number as f32).abs();
                 place[axis] += f64::from(number) * self.step;
             }
         }

@@ -125,8 +125,8 @@ impl Walk {
         let before = self.last[1];
         let context = Context {
             cells: [
-                class_of(f64::from(before)),
-                class_of(f64::from(before)) * 8 + self.last[2].clamp(0, 7) as usize,
+                class_of(before as f32),
+                class_of(before as f32) * 8 + self.last[2].clamp(0, 7) as usize,
                 (before.min(7) * 8 + self.last[5].min(7)) as usize,
             ],
             set: 0,
@@ -160,12 +160,12 @@ impl Walk {
         let place = last.enumerate().find(|(_, corner)| **corner == given);
         let place = place.map_or(0, |(place, _)| place as i32 + 1);
         let edge = self.last[1].min(7) as usize;
-        let class = class_of(f64::from(self.last[3]));
+        let class = class_of(self.last[3] as f32);
         let context = Context {
             cells: [
                 class * 8 + kind,
                 (edge * 8 + kind) * 2,
-                class * CLASSES + class_of(f64::from(self.last[1])),
+                class * CLASSES + class_of(self.last[1] as f32),
             ],
             set: 0,
         };
@@ -184,11 +184,11 @@ impl Walk {
         };
         let fresh = self.fresh.code(coder, &context, i32::from(is_fresh)) != 0;
         self.last[4] = self.last[4] << 1 & 0xff | i32::from(fresh);
-        let class = class_of(f64::from(self.last[5]));
+        let class = class_of(self.last[5] as f32);
         let (base, jump) = match fresh {
             true => {
                 let context = Context {
-                    cells: [class_of(f64::from(self.last[4])), kind],
+                    cells: [class_of(self.last[4] as f32), kind],
                     set: 0,
                 };
                 let base = i64::from(self.next);

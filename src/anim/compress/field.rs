@@ -83,41 +83,60 @@ impl Fields {
 
     /// What the numbers around tell of the one at a rank; `sizes` are below zero where none is known.
     fn context(&self, hierarchy: &Hierarchy, rank: usize, sizes: &[f32]) -> Context<VIEWS> {
-        let mean = |(sum, count): (f32, f32)| (count > 0.0).then(|| f64::from(sum / count));
-        let add = |(sum, count): (f32, f32), size: f32| (sum + size, count + 1.0);
+        let [before, earlier, first] = &self.before;
         let ring = &hierarchy.rings.of(rank)[..hierarchy.inner[rank] as usize];
-        let coarser = ring
-            .iter()
-            .map(|u| sizes[*u as usize])
-            .fold((0.0, 0.0), add);
-        let coarser = mean(coarser).unwrap_or(1.0);
-        let (mut beside, mut last) = ((0.0, 0.0), (0.0, 0.0));
-        for u in hierarchy.neighbours.of(rank) {
+        let coarser = ring.iter().fold(0.0, |sum, u| sum + sizes[*u as usize]);
+        let coarser = if ring.is_empty() {
+            1.0
+        } else {
+            coarser * share(ring.len())
+        };
+        let near = hierarchy.neighbours.of(rank);
+        let (mut beside, mut count, mut last) = (0.0f32, 0usize, 0.0f32);
+        for u in near {
             let size = sizes[*u as usize];
-            if size >= 0.0 {
-                beside = add(beside, size);
-            }
-            last = add(last, self.before[0][*u as usize]);
+            beside += size.max(0.0);
+            count += usize::from(size >= 0.0);
+            last += before[*u as usize];
         }
-        let beside = mean(beside).unwrap_or(coarser);
-        let last = mean(last).unwrap_or(0.0);
-        let [a, b, c] = [0, 1, 2].map(|i| f64::from(self.before[i][rank]));
-        let here = (2.0 * a + b + 0.5 * c) / 3.5;
+        let beside = if count > 0 {
+            beside * share(count)
+        } else {
+            coarser
+        };
+        let last = last * share(near.len());
+        let here = (2.0 * before[rank] + earlier[rank] + 0.5 * first[rank]) * (1.0 / 3.5);
         let level = hierarchy.level(rank);
-        let pair = |x: f64, y: f64| class_of(x) * CLASSES + class_of(y);
+        let all = (coarser + beside + here + last) * 0.25;
+        let [coarser, beside, here, last] = [coarser, beside, here, last].map(|x| class_of(x));
         Context {
             cells: [
-                class_of(coarser) * Hierarchy::LEVELS + level,
-                class_of(here) * Hierarchy::LEVELS + level,
-                pair(coarser, here),
-                pair(beside, last),
-                pair(here, last),
+                coarser * Hierarchy::LEVELS + level,
+                here * Hierarchy::LEVELS + level,
+                coarser * CLASSES + here,
+                beside * CLASSES + last,
+                here * CLASSES + last,
                 level * NUMBERS + self.met.min(NUMBERS - 1),
-                pair((coarser + beside + here + last) / 4.0, a),
+                class_of(all) * CLASSES + class_of(before[rank]),
             ],
             set: level,
         }
     }
+}
+
+/// One over a count; 0 of none.
+#[inline]
+fn share(count: usize) -> f32 {
+    const SHARES: [f32; 32] = {
+        let mut shares = [0.0; 32];
+        let mut i = 1;
+        while i < 32 {
+            shares[i] = 1.0 / i as f32;
+            i += 1;
+        }
+        shares
+    };
+    SHARES.get(count).copied().unwrap_or(1.0 / count as f32)
 }
 
 /// The three coordinates of a shape, each foreseen from those before it too; `given` are their values at

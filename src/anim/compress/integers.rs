@@ -150,12 +150,14 @@ const BOUNDS: [f64; 19] = [
 /// Number of classes of [`class_of`].
 pub const CLASSES: usize = BOUNDS.len() + 1;
 
-/// Classes of small magnitudes, by their hundredths.
+/// Steps of a small magnitude that classes are told by.
+const FINE: f64 = 128.0;
+/// Classes of magnitudes below 8.
 const SMALL: [u8; 1024] = {
     let mut table = [0; 1024];
     let (mut i, mut class) = (0, 0);
     while i < 1024 {
-        while i as f64 > BOUNDS[class] * 100.0 {
+        while i as f64 / FINE > BOUNDS[class] {
             class += 1;
         }
         table[i] = class as u8;
@@ -166,12 +168,9 @@ const SMALL: [u8; 1024] = {
 
 /// The class of an expected magnitude, for use as a cell.
 #[inline]
-pub fn class_of(expected: f64) -> usize {
-    // Rounded up, as a bound is still of the class below it.
-    let hundredths = expected * 100.0;
-    let below = hundredths as usize;
-    let place = below + usize::from((below as f64) < hundredths);
-    match SMALL.get(place) {
+pub fn class_of(expected: impl Into<f64>) -> usize {
+    let expected = expected.into();
+    match SMALL.get((expected * FINE) as usize) {
         Some(class) => usize::from(*class),
         None => BOUNDS.partition_point(|bound| expected > *bound),
     }
@@ -214,12 +213,17 @@ mod tests {
 
     #[test]
     fn classes_are_those_of_the_bounds() {
-        for i in 0..60_000 {
-            let x = f64::from(i) * 0.0117;
-            let class = BOUNDS.partition_point(|bound| x > *bound);
-            assert_eq!(class_of(x), class, "{x}");
+        for i in 0..2000 {
+            let x = f64::from(i) / FINE;
+            assert_eq!(
+                class_of(x),
+                BOUNDS.partition_point(|bound| x > *bound),
+                "{x}"
+            );
+            // Between the steps it is the class of the one below.
+            assert!(x >= 7.9 || class_of(x + 0.9 / FINE) == class_of(x));
         }
-        assert_eq!(class_of(1e9), CLASSES - 1);
+        assert_eq!(class_of(1e9f64), CLASSES - 1);
     }
 
     #[test]

@@ -180,7 +180,7 @@ impl Directions {
     fn context(&self, sizes: &[f32], k: usize, axis: usize) -> Context<6> {
         let frames = self.frames;
         let lower = |j: usize, axis: usize| match k.checked_sub(j) {
-            Some(k) => f64::from(sizes[axis * frames + k]),
+            Some(k) => sizes[axis * frames + k],
             None => 4.0,
         };
         let near = (2.0 * lower(1, axis) + lower(2, axis) + 0.5 * lower(3, axis)) / 3.5;
@@ -192,9 +192,9 @@ impl Directions {
             2 => lower(0, 0),
             _ => lower(1, 1),
         };
-        let last = |k: usize| f64::from(self.before[axis * frames + k.min(frames - 1)]);
+        let last = |k: usize| self.before[axis * frames + k.min(frames - 1)];
         let last = (2.0 * last(k) + last(k - 1) + last(k + 1)) / 4.0;
-        let pair = |x: f64, y: f64| class_of(x) * CLASSES + class_of(y);
+        let pair = |x: f32, y: f32| class_of(x) * CLASSES + class_of(y);
         Context {
             cells: [
                 class_of(near),
