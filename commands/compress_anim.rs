@@ -5,7 +5,7 @@ mod encode;
 mod eval;
 mod info;
 mod picture;
-mod sources;
+pub mod sources;
 
 use crate::exit::Exit;
 use scantle::anim::compress::Summary;

@@ -22,14 +22,14 @@ fn rearranged(change: Change, mesh: &Mesh, seed: u64) -> Mesh {
 fn mesh_of(subject: Subject) -> Mesh {
     match subject {
         Subject::Mesh(mesh) => mesh,
-        Subject::Atoms(_) => panic!("no mesh"),
+        _ => panic!("no mesh"),
     }
 }
 
 fn atoms_of(subject: Subject) -> Vec<Ball> {
     match subject {
         Subject::Atoms(balls) => balls,
-        Subject::Mesh(_) => panic!("no atoms"),
+        _ => panic!("no atoms"),
     }
 }
 
