@@ -5,7 +5,7 @@ mod encode;
 mod eval;
 mod info;
 mod picture;
-mod sources;
+pub mod sources;
 
 use crate::exit::Exit;
 use scantle::anim::compress::Summary;
@@ -21,11 +21,21 @@ use serde::Serialize;
 /// animation is from another; `info` tells what stands in a stream. Vertices, frames and faces keep
 /// their number and their order.
 #[derive(Debug, clap::Args)]
-#[command(subcommand_required = true, arg_required_else_help = true)]
+#[command(
+    subcommand_required = true,
+    arg_required_else_help = true,
+    after_long_help = EXAMPLES
+)]
 pub struct Args {
     #[command(subcommand)]
     verb: Verb,
 }
+
+const EXAMPLES: &str = "\
+Examples:
+  scantle compress-anim encode fixtures/animations/wave.pc2 --base fixtures/animations/wave.obj -o wave.sanim
+  scantle compress-anim decode fixtures/animations/wave.sanim -o wave.glb
+";
 
 /// What to do.
 #[derive(Debug, clap::Subcommand)]

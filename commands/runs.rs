@@ -47,10 +47,11 @@ impl Document {
 impl Runs {
     /// Runs the words that follow the program's name; `options` are added for the report.
     pub fn run(&self, words: &[String], options: &[&str]) -> Result<Vec<Document>, Failed> {
-        let mut all = words[..1].to_vec();
+        let named = command_words(words);
+        let mut all = words[..named].to_vec();
         let added = ["--report", "-", "--quiet", "--timings"];
         all.extend(added.iter().chain(options).map(|word| (*word).to_owned()));
-        all.extend_from_slice(&words[1..]);
+        all.extend_from_slice(&words[named..]);
         if self.verbose {
             say(format_args!("running {}", words::shell(&all)));
         }
@@ -77,6 +78,12 @@ impl Runs {
         }
         Ok(documents)
     }
+}
+
+/// How many words name the command: two where the second is a verb of the first.
+fn command_words(words: &[String]) -> usize {
+    let has_verb = words.len() > 1 && cli::find(&cli::command(), &words[..2].join(" ")).is_some();
+    if has_verb { 2 } else { 1 }
 }
 
 /// Exit code and both streams of a run.

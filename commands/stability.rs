@@ -14,12 +14,11 @@ use crate::wrapped::Wrapped;
 use result::{Asked, Outcome, Row, Stats};
 use scantle::error::{Error, Result};
 use scantle::io::format::{Format, Kind};
-use scantle::io::sink::Sink;
 use scantle::io::source::Source;
 use scantle::io::{self, Content};
 use scantle::measure::stability::{
-    Changed, Drift, Motion, Step, Subject, image_drift, mesh_drift, sphere_drift, steps,
-    volume_drift,
+    Changed, Drift, Motion, Step, Subject, clip_drift, image_drift, mesh_drift, sphere_drift,
+    steps, volume_drift,
 };
 use scantle::measure::tradeoff::Failed;
 use scantle::progress::Progress;
@@ -39,6 +38,10 @@ use tempfile::TempDir;
 /// Of a molecule the atoms that count by default are taken, of the first model, and run as spheres
 /// (xyzr) with the radii of the file, else of the elements; nothing else of it is left. Its atoms are
 /// reordered and doubled; it has no faces to change.
+///
+/// An animation is run as a folder of PLY files, one for each frame, with every digit of its coordinates
+/// and the faces of --base: caches of points hold single precision. Vertices that are reordered or split
+/// are so in all frames, and told apart again in the result.
 ///
 /// Where a change has to round coordinates, the result is compared with that of the input so
 /// rounded, and what the rounding of the input itself does is a figure of its own. Changes under
@@ -113,7 +116,7 @@ pub fn run(args: &Args) -> Result<Exit> {
         return Ok(runs::refuse("stability", &why));
     }
     let places = Places::new(&args.wrapping, &wrapped)?;
-    let (subject, input) = match input::read(name, wrapped.format()) {
+    let (subject, inputs) = match input::read(name, &wrapped) {
         Ok(read) => read,
         Err(error) => return Ok(complain(&error, Some(name))),
     };
@@ -139,7 +142,8 @@ pub fn run(args: &Args) -> Result<Exit> {
         recorder.advance(1);
     }
     recorder.finish();
-    let in_space = !matches!(untouched.content, Some(Content::Image(_)));
+    let other = |content: &Content| matches!(content, Content::Image(_) | Content::Animation(_));
+    let in_space = !untouched.content.as_ref().is_some_and(other);
     let unit = wrapped.trade.error.unit;
     let stats = Stats::new(subject.extent(), untouched.bound, unit, in_space, rows);
     let table = result::table(&stats);
@@ -150,7 +154,7 @@ pub fn run(args: &Args) -> Result<Exit> {
     let exit = judge(&stats, args.max_error);
     let (output, unwritten) = places.write(|| result::plot(&stats), || result::exported(&stats));
     let asked = Asked::new(&wrapped, args);
-    places.deliver("stability", asked, stats, vec![input], output, Vec::new())?;
+    places.deliver("stability", asked, stats, inputs, output, Vec::new())?;
     Ok(exit.max(unwritten))
 }
 
@@ -214,6 +218,14 @@ impl<'a> Bench<'a> {
             format: Format::from_name(wrapped.trade.result).unwrap_or(Format::Ply),
             folder,
         })
+    }
+
+    /// Where a changed input goes: a file, or a folder of its own for the frames of an animation.
+    fn input(&self, subject: &Subject, name: &str) -> PathBuf {
+        match subject {
+            Subject::Clip(_) => self.folder.path().join(name),
+            _ => self.path(name, input::format_of(subject)),
+        }
     }
 
     fn path(&self, name: &str, format: Format) -> PathBuf {
@@ -286,18 +298,20 @@ impl<'a> Bench<'a> {
     ) -> Result<Made, Failed> {
         let format = input::format_of(subject);
         let (from, to) = (
-            self.path(name, format),
+            self.input(subject, name),
             self.path(&format!("{name}-made"), self.format),
         );
-        input::write(subject, &Sink::File(from.clone())).map_err(broken)?;
+        input::write(subject, &from).map_err(broken)?;
         forget(&to).map_err(broken)?;
         let (input, output) = (from.display().to_string(), to.display().to_string());
         let mut options = options.to_vec();
-        if self.wrapped.is_set("input-format") {
+        if self.wrapped.is_set("input-format") && !matches!(subject, Subject::Clip(_)) {
             let format = format.name().to_owned();
             options.push(("input-format".to_owned(), Some(format)));
         }
-        let words = self.wrapped.words(std::slice::from_ref(&input), &options);
+        let without = input::stands_for(subject);
+        let inputs = std::slice::from_ref(&input);
+        let words = self.wrapped.words_without(without, inputs, &options);
         let documents = self.runs.run(&words, &["--output", &output]);
         let documents: Vec<Document> = documents.map_err(|failed| Failed {
             message: failed.message.replace(&input, &self.wrapped.inputs[0]),
@@ -338,17 +352,17 @@ impl<'a> Bench<'a> {
         changed: &Changed,
         untouched: &Made,
     ) -> Result<(Drift, Option<Drift>), Failed> {
-        let motion = &changed.motion;
+        let (motion, order) = (&changed.motion, changed.order.as_deref());
         let made = self.run(&changed.subject, motion, "changed")?;
         let given = self.options(&Motion::NONE, false).map_err(unfit)?;
         let options = self.options(motion, true).map_err(unfit)?;
         if changed.rounded.is_none() && given == options || motion.turn != Motion::NONE.turn {
-            return Ok((drift(untouched, &made, motion)?, None));
+            return Ok((drift(untouched, &made, motion, order)?, None));
         }
         let subject = changed.rounded.as_ref().unwrap_or(self.subject);
         let reference = self.run_with(subject, &options, "rounded")?;
-        let by_input = drift(untouched, &reference, &Motion::NONE)?;
-        Ok((drift(&reference, &made, motion)?, Some(by_input)))
+        let by_input = drift(untouched, &reference, &Motion::NONE, None)?;
+        Ok((drift(&reference, &made, motion, order)?, Some(by_input)))
     }
 }
 
@@ -387,7 +401,13 @@ fn read_back(path: &Path, format: Format) -> Result<Option<Content>> {
     Ok(Some(content))
 }
 
-fn drift(reference: &Made, made: &Made, motion: &Motion) -> Result<Drift, Failed> {
+/// `order` tells which vertex of the reference each is, where an input has them in another order.
+fn drift(
+    reference: &Made,
+    made: &Made,
+    motion: &Motion,
+    order: Option<&[usize]>,
+) -> Result<Drift, Failed> {
     let (a, b) = match (&reference.content, &made.content) {
         (Some(a), Some(b)) => (a, b),
         (None, None) => return Ok(Drift::NONE),
@@ -396,6 +416,9 @@ fn drift(reference: &Made, made: &Made, motion: &Motion) -> Result<Drift, Failed
     match (a, b) {
         (Content::Volume(a), Content::Volume(b)) => Ok(volume_drift(a, b, motion)),
         (Content::Mesh(a), Content::Mesh(b)) => mesh_drift(a, b, motion).map_err(broken),
+        (Content::Animation(a), Content::Animation(b)) => {
+            clip_drift(a, b, motion, order).map_err(broken)
+        }
         (Content::Image(a), Content::Image(b)) => image_drift(a, b).map_err(broken),
         (Content::Molecule(a), Content::Molecule(b)) => {
             Ok(sphere_drift(&a.spheres(), &b.spheres(), motion))

@@ -158,7 +158,8 @@ mod tests {
                 let takes = |count: usize| {
                     let numbers: Vec<String> = (1..=count).map(|n| n.to_string()).collect();
                     let option = format!("--{option}={prefix}{}", numbers.join(","));
-                    takes_words(&[name.to_owned(), "a.ply".to_owned(), option])
+                    let words = name.split(' ').chain(["a.ply", &option]);
+                    takes_words(&words.map(str::to_owned).collect::<Vec<_>>())
                 };
                 let count = parts.iter().map(|part| part.numbers()).sum();
                 assert!(takes(count) && !takes(count + 1), "{name} --{option}");

@@ -148,7 +148,19 @@ impl Wrapped {
     /// The words of a run, from the command's name on: over `inputs`, with the user's options and
     /// `more`, which replace those of the same name.
     pub fn words(&self, inputs: &[String], more: &[(String, Option<String>)]) -> Vec<String> {
-        let is_replaced = |name: &String| more.iter().any(|(other, _)| other == name);
+        self.words_without(&[], inputs, more)
+    }
+
+    /// As [`Wrapped::words`], without some of the user's options.
+    pub fn words_without(
+        &self,
+        without: &[&str],
+        inputs: &[String],
+        more: &[(String, Option<String>)],
+    ) -> Vec<String> {
+        let is_replaced = |name: &String| {
+            without.contains(&name.as_str()) || more.iter().any(|(other, _)| other == name)
+        };
         let kept = self.options().into_iter();
         let options = kept
             .filter(|(name, _)| !is_replaced(name))
@@ -205,11 +217,30 @@ mod tests {
     }
 
     #[test]
+    fn a_verb_is_part_of_the_name() {
+        let line = "compress-anim encode a.pc2 --base b.obj --target-kg 2 --fps=30";
+        let w = wrapped(line).expect("words");
+        assert_eq!(
+            (w.name.as_str(), &w.inputs[..]),
+            ("compress-anim encode", &["a.pc2".to_owned()][..])
+        );
+        let reads: Vec<String> = w.reads().into_iter().map(|reads| reads.word).collect();
+        assert_eq!(reads, ["a.pc2", "b.obj"]);
+        let more = [("target-kg".to_owned(), Some("0.5".to_owned()))];
+        let words = w.words_without(&["base"], &["c".to_owned()], &more);
+        assert_eq!(
+            words.join(" "),
+            "compress-anim encode c --fps 30 --target-kg 0.5"
+        );
+        assert!(Wrapped::check(&words).is_ok());
+    }
+
+    #[test]
     fn what_cannot_be_wrapped_is_refused_with_words() {
         let why = |line| wrapped(line).expect_err("a refusal");
         assert_eq!(
             why("nonsense a"),
-            "there is no command nonsense; those with a trade: voxelize, shadow, smooth-mc, tunnels"
+            "there is no command nonsense; those with a trade: voxelize, shadow, smooth-mc, tunnels, compress-anim encode"
         );
         assert_eq!(why("info a"), "info has no trade: it counts, exactly");
         assert_eq!(
@@ -219,6 +250,10 @@ mod tests {
         assert_eq!(
             why("voxelize -"),
             "standard input can be read only once, and voxelize is run many times: name a file"
+        );
+        assert_eq!(
+            why("compress-anim decode a.sanim"),
+            "compress-anim has no trade: its verb `encode` has one"
         );
         assert!(why("voxelize a.ply --mode x").starts_with("invalid value 'x' for '--mode"));
     }

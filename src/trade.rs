@@ -29,11 +29,20 @@ pub struct Knob {
     pub name: &'static str,
     /// Some of its values, cheapest first.
     pub ladder: &'static [&'static str],
-    /// Whether its values are numbers, of which the smaller are cheaper; else they are names, and
-    /// what the ladder leaves out is cheaper than all of it.
+    /// Whether its values are numbers, of which the smaller are cheaper, or the larger where the ladder
+    /// falls; else they are names, and what the ladder leaves out is cheaper than all of it.
     pub numeric: bool,
     /// Knobs, and a value of each, with which this one has no effect.
     pub idle: &'static [(&'static str, &'static str)],
+}
+
+impl Knob {
+    /// Whether its values are numbers of which the larger are cheaper: the ladder falls.
+    pub fn is_falling(&self) -> bool {
+        let number = |value: Option<&&str>| value.and_then(|value| value.parse::<f64>().ok());
+        let ends = number(self.ladder.first()).zip(number(self.ladder.last()));
+        self.numeric && ends.is_some_and(|(first, last)| first > last)
+    }
 }
 
 /// An option whose value stands in the input's space.

@@ -52,6 +52,26 @@ const CASES: &[(&str, &str, &str)] = &[
         "nrrd",
         "isosurface IN --iso 0.1 -o - --output-format ply",
     ),
+    (
+        "fixtures/animations/wave.pc2",
+        "pc2",
+        "compress-anim encode IN --base fixtures/animations/wave.obj -o - --output-format sanim",
+    ),
+    (
+        "fixtures/animations/wave.mdd",
+        "mdd",
+        "compress-anim encode IN --method delta --target-max 0.001 -o - --output-format sanim",
+    ),
+    (
+        "fixtures/animations/bar-skin.glb",
+        "glb",
+        "compress-anim encode IN --window 10 --target-bpvf 4 -o - --output-format sanim",
+    ),
+    (
+        "fixtures/animations/bar.sanim",
+        "sanim",
+        "compress-anim decode IN -o - --output-format glb",
+    ),
 ];
 
 /// Command lines whose report is compared.
@@ -62,6 +82,8 @@ const REPORTS: &[&str] = &[
     "smooth-mc fixtures/volumes/labels.nii --labels all --verify",
     "smooth-mc fixtures/volumes/labels.nii --label 1 --verify --compare mc,cesn,taubin",
     "shadow fixtures/shapes/torus.obj --size 50x40 --method exact --verify",
+    "compress-anim encode fixtures/animations/bar-skin.glb --ladder",
+    "compress-anim eval fixtures/animations/wave-morph.glb fixtures/animations/wave.sanim",
 ];
 
 #[test]

@@ -77,14 +77,35 @@ fn commands(place: &Workplace) -> Vec<String> {
         .collect();
     names.sort();
     names.dedup();
+    let verbs: Vec<String> = names.iter().flat_map(|name| verbs(place, name)).collect();
+    names.extend(verbs);
     names
+}
+
+/// The verbs of a command that has some, each behind its name.
+fn verbs(place: &Workplace, command: &str) -> Vec<String> {
+    let help = place.run(&format!("{command} --help")).text();
+    let Some((_, listed)) = help.split_once("\nCommands:\n") else {
+        return Vec::new();
+    };
+    let listed = listed.lines().take_while(|line| !line.is_empty());
+    let names = listed.filter_map(|line| {
+        let is_name = line.starts_with("  ") && !line.starts_with("   ");
+        line.split_whitespace().next().filter(|_| is_name)
+    });
+    names
+        .filter(|name| *name != "help")
+        .map(|name| format!("{command} {name}"))
+        .collect()
 }
 
 #[test]
 fn the_help_of_each_command_ends_with_two_examples_that_run() {
     let place = Workplace::new();
     let commands = commands(&place);
-    assert!(commands.contains(&"info".to_owned()), "{commands:?}");
+    for known in ["info", "compress-anim", "compress-anim encode"] {
+        assert!(commands.contains(&known.to_owned()), "{commands:?}");
+    }
     for command in commands {
         let help = place.run(&format!("{command} --help")).text();
         let (_, examples) = help

@@ -70,7 +70,7 @@ fn distance(a: &Mesh, b: &Mesh) -> mesh_distance::MeshDifference {
 fn mesh_of(subject: Subject) -> Mesh {
     match subject {
         Subject::Mesh(mesh) => mesh,
-        Subject::Atoms(_) => unreachable!("a mesh stays one"),
+        _ => unreachable!("a mesh stays one"),
     }
 }
 

@@ -420,6 +420,14 @@ fn an_input_that_the_command_cannot_take_is_said_to_be_one() {
             "stability voxelize fixtures/volumes/ball.nrrd",
             "fixtures/volumes/ball.nrrd: holds a volume (nrrd), but a mesh or a molecule is needed",
         ),
+        (
+            "stability compress-anim encode fixtures/volumes/ball.nrrd",
+            "fixtures/volumes/ball.nrrd: holds a volume (nrrd), but an animation is needed",
+        ),
+        (
+            "stability compress-anim encode fixtures/animations/wave.pc2 --base fixtures/shapes/cube.obj",
+            "fixtures/shapes/cube.obj: the animation has 45 vertices, but its base mesh 8",
+        ),
     ] {
         let place = Workplace::new();
         let ran = place.run(line);
@@ -447,4 +455,67 @@ fn drift_beyond_the_limit_ends_with_1_and_names_the_change() {
     assert_eq!(table.lines().count(), 1 + rows(&report).len());
     let plot = fs::read(place.path("s.png")).expect("the plot");
     assert!(plot.starts_with(b"\x89PNG"));
+}
+
+const WAVE: &str =
+    "compress-anim encode fixtures/animations/wave.pc2 --base fixtures/animations/wave.obj";
+
+#[test]
+fn a_knob_whose_larger_values_are_cheaper_is_tried_from_them_on() {
+    let place = Workplace::new();
+    let ran = place.run(&format!(
+        "tradeoff {WAVE} --vary target-kg=0.1,2,0.5 --repeat 1 --in-process -q --max-error 0.6"
+    ));
+    assert_eq!((ran.code, ran.stderr.as_str()), (0, ""));
+    let report = ran.document();
+    let settings: Vec<f64> = rows(&report)
+        .iter()
+        .map(|row| {
+            let asked = row["setting"]["target-kg"].as_f64().expect("a number");
+            assert!(row["error"].as_f64() <= Some(asked), "{row}");
+            asked
+        })
+        .collect();
+    assert_eq!(settings, [2.0, 0.5, 0.1]);
+    let choice = report["result"]["choice"]["command"].as_str();
+    let choice = choice.expect("a setting that holds");
+    assert!(
+        choice.starts_with("scantle compress-anim encode "),
+        "{choice}"
+    );
+    let pasted = place.shell(choice);
+    assert_eq!(pasted.code, 0, "{choice}: {}", pasted.stderr);
+}
+
+#[test]
+fn streams_bear_every_scale_and_far_places_but_for_their_rounding() {
+    for (input, options) in [
+        (WAVE, ""),
+        // A length is scaled along.
+        (
+            "compress-anim encode fixtures/animations/bar-skin.glb",
+            "--animation bend --fps 10 --target-max 0.01",
+        ),
+        (
+            "compress-anim encode fixtures/animations/frames/frame*.obj",
+            "--method delta --target-rmse 0.001",
+        ),
+    ] {
+        let place = Workplace::new();
+        let ran = place.run(&format!(
+            "stability {input} {options} --in-process --scales -100,-3,1,100 --max-error 1e-3 -q"
+        ));
+        let case = format!("{input} {options}");
+        assert_eq!((ran.code, ran.stderr.as_str()), (0, ""), "{case}");
+        let report = ran.document();
+        assert_eq!(report["result"]["unit"], "percent", "{case}");
+        let unchanged = &report["result"]["unchanged"];
+        assert_eq!(unchanged["smallest_scale"], -100, "{case}");
+        assert_eq!(unchanged["largest_scale"], 100, "{case}");
+        for row in rows(&report) {
+            assert_eq!(row["status"], "done", "{case}: {row}");
+            // Reordered or split vertices are told apart again: nothing like the size of the model.
+            assert!(row["drift"].as_f64() < Some(5.0), "{case}: {row}");
+        }
+    }
 }

@@ -163,8 +163,8 @@ pub struct Stats {
     /// The errors of what is decoded.
     error: AnimationError,
     /// Bits and errors from coarse to fine, with `--ladder`.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
-    ladder: Vec<Rung>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    ladder: Option<Vec<Rung>>,
 }
 
 /// Bits per vertex and frame.
@@ -301,11 +301,8 @@ fn encode(job: &mut Job, args: &Args) -> Result<Found<AnyAsked, AnyFound>> {
     {
         return Err(out_of_reach(&clip, bound));
     }
-    let ladder = if args.ladder {
-        ladder(&clip, &encoder, job)?
-    } else {
-        Vec::new()
-    };
+    let ladder = args.ladder.then(|| ladder(&clip, &encoder, job));
+    let ladder = ladder.transpose()?;
     job.write_bytes(&made.bytes)?;
     let summary = summary(&clip, &made, &error);
     job.write_preview(|_| picture::of_stream(&clip, &made.bytes, &error, &summary));
@@ -391,7 +388,7 @@ fn stats(
     encoder: &Encoder,
     made: &Made,
     error: AnimationError,
-    ladder: Vec<Rung>,
+    ladder: Option<Vec<Rung>>,
 ) -> Stats {
     let norm = encoder.norm();
     let predicted = made.stats.predicted_squared_error;

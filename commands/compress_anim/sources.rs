@@ -21,7 +21,7 @@ pub struct Sampling<'a> {
 }
 
 /// What reading gives.
-type Read = Result<(Clip, Vec<Input>, Vec<Warning>)>;
+pub type Read = Result<(Clip, Vec<Input>, Vec<Warning>)>;
 
 /// Whether words are the frames of one animation, one mesh each.
 pub fn are_frames(words: &[String]) -> bool {
@@ -54,7 +54,8 @@ pub fn read(job: &mut Job, sampling: Sampling, base: Option<&str>) -> Result<Cli
     with_base(clip, mesh, path)
 }
 
-fn with_base(clip: Clip, mesh: Mesh, path: &str) -> Result<Clip> {
+/// The animation with the faces of a mesh that was read from `path`.
+pub fn with_base(clip: Clip, mesh: Mesh, path: &str) -> Result<Clip> {
     clip.with_base(mesh).map_err(|fault| Error::Malformed {
         path: path.into(),
         fault,
@@ -67,7 +68,8 @@ impl Sampling<'_> {
     }
 }
 
-fn animation(word: &str, format: Option<Format>, sampling: Sampling, memory: u64) -> Read {
+/// Reads what a word names as an animation, holding at most `memory` bytes at once.
+pub fn animation(word: &str, format: Option<Format>, sampling: Sampling, memory: u64) -> Read {
     if word != "-" && sequence::is_sequence(word) {
         let paths = sequence::find(word, format)?;
         return sequence::read(&paths, format, sampling.rate(), memory);

@@ -31,9 +31,10 @@ pub struct Asked {
 
 impl Asked {
     pub fn new(wrapped: &Wrapped, args: &Args) -> Self {
+        let named = wrapped.name.split(' ').count();
         Asked {
             command: wrapped.name.clone(),
-            words: wrapped.words(&wrapped.inputs, &[]).split_off(1),
+            words: wrapped.words(&wrapped.inputs, &[]).split_off(named),
             scales: args.scales.0.clone(),
             offsets: args.offsets.0.clone(),
             seed: args.seed.seed,
@@ -98,9 +99,10 @@ pub struct Row {
     message: Option<String>,
     /// Largest distance from something in one result to the nearest in the other, for spheres that of
     /// their centres or the difference of their radii; for pictures the largest difference of a channel,
-    /// where 1 is full.
+    /// where 1 is full; for animations the error about the centroids in percent.
     drift: Option<f64>,
-    /// The same over the longest side of the input's box; without meaning for pictures, and null.
+    /// The same over the longest side of the input's box; without meaning for pictures and
+    /// animations, and null.
     drift_relative: Option<f64>,
     /// Voxels set in one result and not in the other.
     differing_voxels: Option<u64>,

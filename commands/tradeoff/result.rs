@@ -41,7 +41,9 @@ impl Asked {
             .map(|(name, values)| (name.to_owned(), values.into()));
         Asked {
             command: wrapped.name.clone(),
-            words: wrapped.words(&wrapped.inputs, &[]).split_off(1),
+            words: wrapped
+                .words(&wrapped.inputs, &[])
+                .split_off(wrapped.name.split(' ').count()),
             vary: vary.collect(),
             params,
             limits,

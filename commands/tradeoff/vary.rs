@@ -133,6 +133,9 @@ fn parse(word: &str, wrapped: &Wrapped) -> Result<(&'static Knob, Vec<String>), 
         // What is no number is for clap to refuse.
         let number = |value: &String| value.parse().unwrap_or(f64::NAN);
         values.sort_by(|a, b| number(a).total_cmp(&number(b)));
+        if knob.is_falling() {
+            values.reverse();
+        }
     } else {
         values.sort_by_key(|value| knob.ladder.iter().position(|step| step == value));
     }

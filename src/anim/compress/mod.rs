@@ -27,7 +27,7 @@ pub use params::{Clusters, Method, Params, Target};
 pub use stream::{Stream, Summary, is_stream, room_to_decode, summary};
 
 use crate::anim::Clip;
-use crate::trade::{Knob, Measure, Trade};
+use crate::trade::{Change, Invariance, Knob, Measure, Part, Placed, Trade};
 
 /// What coding an animation trades for what.
 pub const TRADE: Trade = Trade {
@@ -51,9 +51,15 @@ pub const TRADE: Trade = Trade {
     },
     reference: "the animation as it was read",
     result: "sanim",
-    placed: &[],
+    placed: &[
+        Placed::new("target-rmse", &[Part::Length]),
+        Placed::new("target-max", &[Part::Length]),
+    ],
     tied: &[],
-    invariant: &[],
+    invariant: &[
+        Invariance::always(Change::Scale),
+        Invariance::always(Change::Shift),
+    ],
 };
 
 /// Bytes that coding a clip takes beside the clip: products of all trajectories, directions and

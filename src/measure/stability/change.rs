@@ -1,7 +1,8 @@
-//! The steps: what is done to a mesh or to atoms, and what of it is rounding.
+//! The steps: what is done to a mesh, to atoms or to an animation, and what of it is rounding.
 
 use super::motion::Motion;
 use super::subject::Subject;
+use crate::anim::Clip;
 use crate::mesh::Mesh;
 use crate::numeric::rng::Rng;
 use crate::numeric::vector::{length, sub};
@@ -23,13 +24,15 @@ pub enum Step {
     Plain(Change),
 }
 
-/// A mesh or atoms after a step.
+/// A mesh, atoms or an animation after a step.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Changed {
     /// What became of it.
     pub subject: Subject,
     /// How it was moved, if it was.
     pub motion: Motion,
+    /// Where vertices have other numbers: which each was.
+    pub order: Option<Vec<usize>>,
     /// Where coordinates were rounded: what at the old place `subject` is, moved exactly.
     pub rounded: Option<Subject>,
     /// How far that moved vertices or atoms.
@@ -69,7 +72,7 @@ impl Rounding {
 const DEGENERATE: u64 = 64;
 
 impl Step {
-    /// Changes a mesh or atoms; `seed` draws orders and bits. Errs, with the reason, where the step cannot
+    /// Changes a mesh, atoms or an animation; `seed` draws orders and bits. Errs, with the reason, where the step cannot
     /// be taken. Faces of more corners than three become the triangles they were split into where
     /// elements change. Cost: a copy.
     pub fn apply(self, subject: &Subject, seed: u64) -> Result<Changed, String> {
@@ -92,22 +95,55 @@ impl Step {
                 finite(Changed {
                     subject: changed,
                     motion: Motion::NONE,
+                    order: None,
                     rounded: None,
                     rounding,
                 })
             }
-            Step::Plain(change) => Ok(Changed {
-                subject: match subject {
-                    Subject::Mesh(mesh) => Subject::Mesh(rearranged(change, mesh, seed)?),
-                    Subject::Atoms(balls) => Subject::Atoms(reordered(change, balls, seed)?),
-                },
-                motion: Motion::NONE,
-                rounded: None,
-                rounding: Rounding::default(),
-            }),
+            Step::Plain(change) => {
+                let (subject, order) = match subject {
+                    Subject::Mesh(mesh) => {
+                        let (mesh, order) = rearranged(change, mesh, seed)?;
+                        (Subject::Mesh(mesh), order)
+                    }
+                    Subject::Atoms(balls) => {
+                        (Subject::Atoms(reordered(change, balls, seed)?), None)
+                    }
+                    Subject::Clip(clip) => {
+                        let (clip, order) = renumbered(change, clip, seed)?;
+                        (Subject::Clip(clip), order)
+                    }
+                };
+                Ok(Changed {
+                    subject,
+                    motion: Motion::NONE,
+                    order,
+                    rounded: None,
+                    rounding: Rounding::default(),
+                })
+            }
         }
     }
 }
+
+/// The clip with other elements, or in another order, in all its frames; and which vertex each was.
+fn renumbered(change: Change, clip: &Clip, seed: u64) -> Result<(Clip, Order), String> {
+    let (mesh, order) = rearranged(change, &clip.mesh, seed)?;
+    let frames = (0..clip.frames()).map(|f| clip.frame(f));
+    let positions = match &order {
+        Some(order) => frames.flat_map(|at| order.iter().map(|v| at[*v])).collect(),
+        None => clip.positions.clone(),
+    };
+    let changed = Clip {
+        mesh,
+        positions,
+        ..*clip
+    };
+    Ok((changed, order))
+}
+
+/// Which vertex each was, where they have other numbers.
+type Order = Option<Vec<usize>>;
 
 /// The atoms in another order, or twice: they have no elements to change.
 fn reordered(change: Change, balls: &[Ball], seed: u64) -> Result<Vec<Ball>, String> {
@@ -120,20 +156,25 @@ fn reordered(change: Change, balls: &[Ball], seed: u64) -> Result<Vec<Ball>, Str
     Ok(changed)
 }
 
-/// The mesh with other elements, or in another order.
-fn rearranged(change: Change, mesh: &Mesh, seed: u64) -> Result<Mesh, String> {
+/// The mesh with other elements, or in another order; and which vertex each was.
+fn rearranged(change: Change, mesh: &Mesh, seed: u64) -> Result<(Mesh, Order), String> {
+    let mut order = None;
     let mut changed = Mesh {
         polygons: None,
         ..mesh.clone()
     };
     match change {
-        Change::VertexOrder => permute_vertices(&mut changed, seed),
+        Change::VertexOrder => order = Some(permute_vertices(&mut changed, seed)),
         Change::FaceOrder => {
             shuffle(&mut changed.triangles, seed);
             shuffle(&mut changed.segments, seed);
             shuffle(&mut changed.points, seed);
         }
-        Change::SplitVertices => changed = split(mesh),
+        Change::SplitVertices => {
+            let own;
+            (changed, own) = split(mesh);
+            order = Some(own);
+        }
         Change::DuplicateFaces => {
             changed.triangles.extend_from_within(..);
             changed.segments.extend_from_within(..);
@@ -154,10 +195,10 @@ fn rearranged(change: Change, mesh: &Mesh, seed: u64) -> Result<Mesh, String> {
             return Err(format!("{} is no change of elements", change.name()));
         }
     }
-    Ok(changed)
+    Ok((changed, order))
 }
 
-/// A mesh or atoms moved. `exactly` says that the motion, undone, gives back what was really moved.
+/// A mesh, atoms or an animation moved. `exactly` says that the motion, undone, gives back what was really moved.
 fn moved(subject: &Subject, motion: Motion, exactly: bool) -> Result<Changed, String> {
     let changed = subject.moved(&motion);
     let back = subject.taken_back(&changed, &motion);
@@ -168,6 +209,7 @@ fn moved(subject: &Subject, motion: Motion, exactly: bool) -> Result<Changed, St
     finite(Changed {
         subject: changed,
         motion,
+        order: None,
         rounded: stands.then_some(back),
         rounding,
     })
@@ -188,7 +230,8 @@ fn shuffle<T>(items: &mut [T], seed: u64) {
     }
 }
 
-fn permute_vertices(mesh: &mut Mesh, seed: u64) {
+/// Gives the vertices other numbers. Returns which each was.
+fn permute_vertices(mesh: &mut Mesh, seed: u64) -> Vec<usize> {
     let mut order: Vec<usize> = (0..mesh.positions.len()).collect();
     shuffle(&mut order, seed);
     let mut place = vec![0u32; order.len()];
@@ -203,6 +246,7 @@ fn permute_vertices(mesh: &mut Mesh, seed: u64) {
         .for_each(to_new);
     mesh.segments.as_flattened_mut().iter_mut().for_each(to_new);
     mesh.points.iter_mut().for_each(to_new);
+    order
 }
 
 /// Makes the vertices those of these old indices.
@@ -216,8 +260,9 @@ fn take(mesh: &mut Mesh, order: &[usize]) {
     }
 }
 
-/// The same elements, none of which shares a vertex. Vertices that no element uses are kept first.
-fn split(mesh: &Mesh) -> Mesh {
+/// The same elements, none of which shares a vertex, and which vertex each was. Vertices that no element
+/// uses are kept first.
+fn split(mesh: &Mesh) -> (Mesh, Vec<usize>) {
     let mut changed = Mesh {
         polygons: None,
         ..mesh.clone()
@@ -245,5 +290,5 @@ fn split(mesh: &Mesh) -> Mesh {
         .for_each(&mut own);
     changed.points.iter_mut().for_each(&mut own);
     take(&mut changed, &order);
-    changed
+    (changed, order)
 }

@@ -1,8 +1,10 @@
 //! How far a result is from where it should be.
 
 use super::motion::Motion;
+use crate::anim::Clip;
 use crate::error::Result;
 use crate::image::samples::Image;
+use crate::measure::animation_error::animation_error;
 use crate::measure::{image_difference, mesh_distance};
 use crate::mesh::Mesh;
 use crate::numeric::vector::{Vec3, add, cross, dot, length, normalize, scale, sub};
@@ -20,7 +22,7 @@ pub struct Drift {
     /// Voxels set in one result and not in the other; `None` where results have no voxels.
     pub differing: Option<u64>,
     /// Largest distance from something in one result to the nearest in the other; `None` where one
-    /// of both is empty and the other is not.
+    /// of both is empty and the other is not. For pictures and animations in the unit of their error.
     pub distance: Option<f64>,
     /// How far the whole stands from where it should: what the rounding of a grid's origin moves it
     /// by. Not part of `distance`.
@@ -90,6 +92,35 @@ pub fn image_drift(reference: &Image, changed: &Image) -> Result<Drift> {
         differing: None,
         distance: Some(difference.max / 255.0),
         place: 0.0,
+    })
+}
+
+/// How far an animation drifted: `changed` is what became of the input moved by `motion`, its vertices
+/// those of the reference that `order` names. In percent of frames drawn together to their centroids, in
+/// place of a distance; see [`animation_error`]. It is `None` where those have no extent and there is a
+/// drift.
+///
+/// Errs where the animations have not as many vertices and frames. Cost: linear.
+pub fn clip_drift(
+    reference: &Clip,
+    changed: &Clip,
+    motion: &Motion,
+    order: Option<&[usize]>,
+) -> Result<Drift> {
+    let undone = changed.positions.iter().map(|p| motion.undo(*p)).collect();
+    let undone = Clip::cloud(changed.vertices(), undone, changed.start, changed.rate);
+    let error = match order {
+        None => animation_error(reference, &undone)?,
+        Some(order) => {
+            let frames = (0..reference.frames()).map(|f| reference.frame(f));
+            let positions = frames.flat_map(|at| order.iter().map(|v| at[*v])).collect();
+            let there = Clip::cloud(order.len(), positions, reference.start, reference.rate);
+            animation_error(&there, &undone)?
+        }
+    };
+    Ok(Drift {
+        distance: error.kg_centroid_percent,
+        ..Drift::NONE
     })
 }
 

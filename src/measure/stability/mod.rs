@@ -1,7 +1,7 @@
 //! Inputs at the extremes, and how far the results drift from that of the untouched input.
 //!
-//! A step changes a mesh, or the atoms of a molecule, so that what becomes of the result is known: it moves along, or stays as
-//! it is. Where coordinates had to be rounded, the step says what input it really stands for, so
+//! A step changes a mesh, the atoms of a molecule or an animation, so that what becomes of the result is
+//! known: it moves along, or stays as it is. Where coordinates had to be rounded, the step says what input it really stands for, so
 //! that a fault of the algorithm is told from the rounding of its input.
 
 mod change;
@@ -11,7 +11,7 @@ mod spheres;
 mod subject;
 
 pub use change::{Changed, Rounding, Step};
-pub use drift::{Drift, image_drift, mesh_drift, volume_drift};
+pub use drift::{Drift, clip_drift, image_drift, mesh_drift, volume_drift};
 pub use motion::Motion;
 pub use spheres::sphere_drift;
 pub use subject::Subject;

@@ -1,6 +1,7 @@
-//! What is taken to the extremes: a mesh, or the atoms of a molecule.
+//! What is taken to the extremes: a mesh, the atoms of a molecule, or an animation.
 
 use super::motion::Motion;
+use crate::anim::Clip;
 use crate::mesh::Mesh;
 use crate::numeric::vector::Vec3;
 use crate::protein::clearance::Ball;
@@ -13,14 +14,18 @@ pub enum Subject {
     Mesh(Mesh),
     /// Atoms: points with radii, which are lengths.
     Atoms(Vec<Ball>),
+    /// Frames of one mesh.
+    Clip(Clip),
 }
 
 impl Subject {
-    /// The points that are moved: vertices, or centres of atoms. Cost: a copy of them.
+    /// The points that are moved: vertices, frame by frame where there are several, or centres of atoms.
+    /// Cost: a copy of them.
     pub fn points(&self) -> Vec<Vec3> {
         match self {
             Subject::Mesh(mesh) => mesh.positions.clone(),
             Subject::Atoms(balls) => balls.iter().map(|ball| ball.centre).collect(),
+            Subject::Clip(clip) => clip.positions.clone(),
         }
     }
 
@@ -29,6 +34,7 @@ impl Subject {
         let bounds = match self {
             Subject::Mesh(mesh) => mesh.bounds(),
             Subject::Atoms(balls) => Aabb::around(balls.iter().map(|ball| &ball.centre)),
+            Subject::Clip(clip) => clip.bounds(),
         };
         let sides = bounds.extent();
         let longest = sides[0].max(sides[1]).max(sides[2]);
@@ -45,6 +51,12 @@ impl Subject {
                 let centres = balls.iter_mut().map(|ball| &mut ball.centre);
                 centres.enumerate().for_each(each);
             }
+            Subject::Clip(clip) => {
+                clip.positions.iter_mut().enumerate().for_each(each);
+                let first = clip.positions.iter();
+                let here = clip.mesh.positions.iter_mut().zip(first);
+                here.for_each(|(here, p)| *here = *p);
+            }
         }
         changed
     }
@@ -53,7 +65,7 @@ impl Subject {
     pub(super) fn moved(&self, motion: &Motion) -> Subject {
         let mut changed = self.with_points(|_, p| motion.apply(p));
         match &mut changed {
-            Subject::Mesh(mesh) => {
+            Subject::Mesh(mesh) | Subject::Clip(Clip { mesh, .. }) => {
                 let normals = mesh.normals.iter_mut().flatten();
                 normals.for_each(|n| *n = motion.turned(*n));
             }
@@ -75,7 +87,8 @@ impl Subject {
                 };
                 Subject::Atoms(balls.iter().map(back).collect())
             }
-            // What else a mesh has is as it was.
+            // What else a mesh or a clip has is as it was.
+            Subject::Clip(clip) => self.with_points(|i, _| motion.undo(clip.positions[i])),
             Subject::Mesh(mesh) => self.with_points(|v, _| motion.undo(mesh.positions[v])),
         }
     }
@@ -84,14 +97,17 @@ impl Subject {
     pub(super) fn stands_as(&self, other: &Subject) -> bool {
         match (self, other) {
             (Subject::Mesh(a), Subject::Mesh(b)) => a.positions == b.positions,
+            (Subject::Clip(a), Subject::Clip(b)) => a.positions == b.positions,
             (a, b) => a == b,
         }
     }
 
     /// Whether all points and lengths are finite.
     pub(super) fn is_finite(&self) -> bool {
+        let finite = |points: &[Vec3]| points.as_flattened().iter().all(|c| c.is_finite());
         match self {
-            Subject::Mesh(mesh) => mesh.positions.as_flattened().iter().all(|c| c.is_finite()),
+            Subject::Mesh(mesh) => finite(&mesh.positions),
+            Subject::Clip(clip) => finite(&clip.positions),
             Subject::Atoms(balls) => balls
                 .iter()
                 .all(|ball| ball.radius.is_finite() && ball.centre.iter().all(|c| c.is_finite())),

@@ -1,4 +1,5 @@
 use super::*;
+use crate::anim::Clip;
 use crate::mesh::Mesh;
 use crate::mesh::shapes::{octasphere, torus_knot};
 use crate::numeric::vector::{Vec3, length, sub};
@@ -22,14 +23,14 @@ fn rearranged(change: Change, mesh: &Mesh, seed: u64) -> Mesh {
 fn mesh_of(subject: Subject) -> Mesh {
     match subject {
         Subject::Mesh(mesh) => mesh,
-        Subject::Atoms(_) => panic!("no mesh"),
+        _ => panic!("no mesh"),
     }
 }
 
 fn atoms_of(subject: Subject) -> Vec<Ball> {
     match subject {
         Subject::Atoms(balls) => balls,
-        Subject::Mesh(_) => panic!("no atoms"),
+        _ => panic!("no atoms"),
     }
 }
 
@@ -164,6 +165,61 @@ fn atoms() -> Vec<Ball> {
         }
     };
     (0..60).map(atom).collect()
+}
+
+#[test]
+fn clips_move_in_all_frames_and_their_drift_knows_the_order() {
+    let mesh = ball();
+    let raised = mesh.positions.iter().map(|[x, y, z]| [*x, *y, z + x * y]);
+    let positions: Vec<Vec3> = mesh.positions.iter().copied().chain(raised).collect();
+    let clip = Clip {
+        mesh,
+        positions,
+        start: 0.5,
+        rate: 25.0,
+    };
+    let apply = |step: Step| {
+        let changed = step.apply(&Subject::Clip(clip.clone()), 3);
+        let changed = changed.expect("a clip");
+        let Subject::Clip(moved) = changed.subject.clone() else {
+            panic!("no clip");
+        };
+        moved.check().expect("a sound clip");
+        assert_eq!(moved.mesh.positions, moved.frame(0));
+        assert_eq!((moved.frames(), moved.start, moved.rate), (2, 0.5, 25.0));
+        (changed, moved)
+    };
+    let drift = |changed: &Changed, moved: &Clip| {
+        let drift = clip_drift(&clip, moved, &changed.motion, changed.order.as_deref());
+        drift.expect("as many of all").distance.expect("an extent")
+    };
+    for step in [
+        Step::Scale(-60),
+        Step::QuarterTurn(1),
+        Step::Plain(Change::VertexOrder),
+        Step::Plain(Change::FaceOrder),
+        Step::Plain(Change::SplitVertices),
+        Step::Plain(Change::DuplicateFaces),
+        Step::Plain(Change::DegenerateFaces),
+    ] {
+        let (changed, moved) = apply(step);
+        assert_eq!(drift(&changed, &moved), 0.0, "{step:?}");
+        assert_eq!(changed.rounding, Rounding::default(), "{step:?}");
+    }
+    let (_, shuffled) = apply(Step::Plain(Change::VertexOrder));
+    let (_, split) = apply(Step::Plain(Change::SplitVertices));
+    assert!(shuffled.positions != clip.positions);
+    assert_eq!(split.vertices(), 3 * clip.mesh.triangles.len());
+    let (far, moved) = apply(Step::Shift(1e9));
+    assert!(far.rounded.is_some() && far.rounding.max > 0.0);
+    let off = drift(&far, &moved);
+    assert!(off > 0.0 && off < 1e-4, "{off}");
+    // A vertex of the second frame that is moved shows, whatever its number is.
+    let (changed, mut moved) = apply(Step::Plain(Change::VertexOrder));
+    moved.positions[clip.vertices() + 5][0] += 0.5;
+    assert!(drift(&changed, &moved) > 0.1);
+    let fewer = Clip::cloud(clip.vertices(), clip.frame(0).to_vec(), 0.0, 25.0);
+    assert!(clip_drift(&clip, &fewer, &Motion::NONE, None).is_err());
 }
 
 #[test]
