@@ -1,6 +1,27 @@
 //! Animations in as few bits as the error asked for allows.
 //!
-//! wip
+//! A stream ([`container`]) holds the faces as they stand (`faces`), and the motion in windows of frames
+//! by one of several methods:
+//!
+//! - `trajectory`: components of the trajectories of all vertices over a window, their weights foreseen
+//!   over the mesh. The default.
+//! - `delta`: every frame from the one before. It asks nothing of the motion, and is the floor that
+//!   `auto` never falls below.
+//! - [`local`]: clusters that move with frames of reference, and components in each (RLPCA); the same
+//!   without frames (LPCA); or of all vertices together (PCA).
+//!
+//! All of them write whole numbers with one entropy coder (`coder`) under models that learn (`mixing`,
+//! `integers`), and quantise for what is asked: a number is rounded down where that saves more bits than
+//! it adds error. `search` finds the step that reaches a target; `corrections` make a bound on every
+//! vertex hard. What the encoder expects is what a decoder gets, and the command measures that anyway.
+//!
+//! Decoders compute positions in floating point from whole numbers; no decision of theirs depends on
+//! those positions, so that another machine's last bits change the last bits of a coordinate and nothing
+//! else.
+//!
+//! Where the paper ("Efficient compression of 3D dynamic mesh sequences", WSCG 2007) is silent or
+//! damaged: its error is reported both about each frame's centroid and about each vertex's mean over
+//! time; its method is read as [`local`] says.
 
 mod clustered;
 mod coder;
