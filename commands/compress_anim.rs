@@ -33,7 +33,7 @@ pub struct Args {
 
 const EXAMPLES: &str = "\
 Examples:
-  scantle compress-anim encode fixtures/animations/wave.pc2 --base fixtures/animations/wave.obj -o wave.sanim
+  scantle compress-anim encode fixtures/animations/wave-morph.glb -o wave.sanim
   scantle compress-anim decode fixtures/animations/wave.sanim -o wave.glb
 ";
 

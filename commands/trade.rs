@@ -71,8 +71,11 @@ pub const TABLE: &[(&str, Declared)] = &[
     ("help", Declared::None("it reads no data")),
 ];
 
-/// The trade of a command; else why there is none.
+/// The trade of a command, or of a verb of one; else why there is none.
 pub fn of(command: &str) -> Result<&'static Trade, String> {
+    let is_there = TABLE.iter().any(|(name, _)| *name == command);
+    let whole = command.split_once(' ').filter(|_| !is_there);
+    let command = whole.map_or(command, |(whole, _)| whole);
     match TABLE.iter().find(|(name, _)| *name == command) {
         Some((_, Declared::Trade(trade))) => Ok(trade),
         Some((_, Declared::None(reason))) => Err(format!("{command} has no trade: {reason}")),

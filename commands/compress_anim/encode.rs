@@ -106,8 +106,8 @@ The first measure of `accuracy`, which --max-error checks, is the error of Karni
 the centroids, in percent; it is always measured on what is decoded, with --verify or without.
 
 Examples:
-  scantle compress-anim encode fixtures/animations/wave.pc2 --base fixtures/animations/wave.obj -o wave.sanim
-  scantle compress-anim encode fixtures/animations/bar-skin.glb --fps 30 --target-max 0.001 -o bar.sanim
+  scantle compress-anim encode fixtures/animations/wave.pc2 --base fixtures/animations/wave.obj
+  scantle compress-anim encode fixtures/animations/bar-skin.glb --target-max 0.001 -o bar.sanim
 ";
 
 /// The errors of the ladder, in percent.
