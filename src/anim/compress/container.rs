@@ -205,8 +205,7 @@ pub fn parse(bytes: &[u8]) -> Result<Sections<'_>, Fault> {
     match bytes.get(MAGIC.len()) {
         Some(version) if (1..=VERSION).contains(version) => {}
         Some(version) => {
-            let problem =
-                format!("is of version {version}, but only versions 1 to {VERSION} are known");
+            let problem = format!("is of version {version}; those up to {VERSION} are known");
             return Err(Fault::byte(MAGIC.len(), problem));
         }
         None => return Err(Fault::byte(MAGIC.len(), "ends before its version")),

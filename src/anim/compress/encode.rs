@@ -423,7 +423,7 @@ impl Encoder<'_> {
         // As much error in each frame as the components have on the mean.
         let error = whole.squared_error / frames as f64;
         let step = (12.0 * error / (3 * window.vertices) as f64).sqrt();
-        if !(step > 0.0) {
+        if step.is_nan() || step <= 0.0 {
             return false;
         }
         let told = delta::encode(
