@@ -58,7 +58,7 @@ const PARTS: &[Part] = &[
     },
 ];
 
-const ADVICE_ON_ANIMATIONS: &str = "Choose the error, and leave the method at `auto`: it is that of least bytes, which [on four animations of research](compress-anim.md) took between a half and nine tenths of those of `rlpca`, and a fifth to a twentieth of those of a plain coder. A smaller error costs bits more than seconds.";
+const ADVICE_ON_ANIMATIONS: &str = "Choose the error, and leave the method at `auto`: its streams, [on four animations of research](compress-anim.md), took between a half and nine tenths of those of `rlpca`, and a fifth to a sixtieth of those of differences packed by xz. A smaller error costs bits more than seconds.";
 
 const ADVICE_ON_TUNNELS: &str = "Choose `exact`: it costs two or three times what `approximate` does, some hundredths of a second for a protein, and leaves nothing to doubt. `approximate` is for many thousands of frames; its two bounds say of each how far it may be off. `balls:12` is nearest to the truth of those that do not know it, at several times the cost of `exact`. Grids are what others use: [on three enzymes](tunnels.md) they err more than `approximate` at any spacing that costs less than `exact`.";
 

@@ -13,6 +13,9 @@ const TRIED: [usize; 7] = [4, 6, 8, 10, 14, 20, 30];
 /// Bits of the points of frames of reference, where no error tells how many suit.
 const SEED_BITS: u32 = 16;
 
+/// Bytes that the heads of a few sections take.
+const SECTIONS: f64 = 40.0;
+
 impl Encoder<'_> {
     /// A stream of clusters for a target; see [`Encoder::make`].
     pub(super) fn make_clustered(&self, target: Target, progress: &dyn Progress) -> Result<Made> {
@@ -20,14 +23,15 @@ impl Encoder<'_> {
             return self.within_bound(bound, progress);
         }
         let mut told = Vec::new();
-        for (number, window) in self.windows.iter().enumerate() {
+        for window in &self.windows {
             let share = window.frames() as f64 / self.header.frames as f64;
             let goal = match (self.clusters.components, target, self.squared_error(target)) {
                 (Some(components), ..) => Goal::Components(components),
                 (None, Target::Bpvf(bits), _) => {
                     let positions = (window.vertices * window.frames()) as f64;
-                    // What the heads of sections take is known only after.
-                    Goal::Bits(bits * positions - 8.0 * self.framing(number))
+                    // What the heads of its sections take is known only after.
+                    let share = self.overhead() / self.windows.len() as f64;
+                    Goal::Bits(bits * positions - share - 8.0 * SECTIONS)
                 }
                 (None, _, error) => Goal::SquaredError(error.unwrap_or_default() * share),
             };
@@ -39,12 +43,6 @@ impl Encoder<'_> {
             self.check_reached(target, &best)?;
         }
         Ok(self.assemble(self.method, best, 1))
-    }
-
-    /// Bytes that a window takes beside its payloads, and its share of those of the header.
-    fn framing(&self, number: usize) -> f64 {
-        let header = if number == 0 { 90.0 } else { 0.0 };
-        header + 30.0
     }
 
     /// A stream in which no vertex is farther than a bound: the shortest of several errors that are then

@@ -363,7 +363,7 @@ impl Encoder<'_> {
             Target::Bpvf(bits) => {
                 let positions = (self.header.vertices * self.header.frames) as f64;
                 let first = self.first_step(1e-6 * self.norm.max(1e-3 * positions));
-                let wanted = search::Wanted::Bits(bits * positions);
+                let wanted = search::Wanted::Bits(bits * positions - self.overhead());
                 search::search(wanted, first, self.steps(), trial)
             }
             Target::Kg(_) | Target::Rmse(_) => {
@@ -374,6 +374,13 @@ impl Encoder<'_> {
         };
         self.check_reached(target, &best)?;
         Ok(self.assemble(method, best, trials))
+    }
+
+    /// Bits that every stream of the clip takes beside those of its windows and faces.
+    pub(super) fn overhead(&self) -> f64 {
+        let header = container::whole(self.header.write().len());
+        let faces = container::whole(self.faces.len()) as f64 - self.face_bits / 8.0;
+        8.0 * ((container::begin().len() + header + container::whole(0)) as f64 + faces)
     }
 
     /// A squared error in local units as a target says it.
@@ -390,7 +397,7 @@ impl Encoder<'_> {
         let positions = (self.header.vertices * self.header.frames) as f64;
         let reached = match target {
             Target::Kg(_) | Target::Rmse(_) => self.as_target(target, best.squared_error),
-            Target::Bpvf(_) => best.bits / positions,
+            Target::Bpvf(_) => (best.bits + self.overhead()) / positions,
             Target::Max(_) => return Ok(()),
         };
         let wanted = target.value();
