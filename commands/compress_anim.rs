@@ -51,7 +51,7 @@ enum Verb {
 #[serde(tag = "verb", rename_all = "kebab-case")]
 pub enum Asked {
     /// To make a stream.
-    Encode(encode::Asked),
+    Encode(Box<encode::Asked>),
     /// To make an animation of a stream.
     Decode(decode::Asked),
     /// To compare two animations.

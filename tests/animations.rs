@@ -142,8 +142,11 @@ const FILES: &[Row] = &[
     }),
 ];
 
+/// A stream: its file, the clip that it is of, and what it was made to.
+type Streamed = (&'static str, fn() -> Clip, Target);
+
 /// Streams: what each is of, and the error that it was made to.
-const STREAMS: &[(&str, fn() -> Clip, Target)] = &[
+const STREAMS: &[Streamed] = &[
     ("animations/wave.sanim", || wave(FRAMES), Target::Kg(0.1)),
     ("animations/bar.sanim", sampled_bar, Target::Max(0.001)),
 ];

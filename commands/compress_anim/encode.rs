@@ -309,7 +309,7 @@ fn encode(job: &mut Job, args: &Args) -> Result<Found<AnyAsked, AnyFound>> {
     let stats = stats(&clip, &encoder, &made, error, ladder);
     let accuracy = stats.error.accuracy(compress::TRADE.reference);
     let modelled = modelled(&clip, &made);
-    let asked = AnyAsked::Encode(Asked {
+    let asked = AnyAsked::Encode(Box::new(Asked {
         base: args.base.clone(),
         fps: args.fps,
         animation: args.animation.clone(),
@@ -323,7 +323,7 @@ fn encode(job: &mut Job, args: &Args) -> Result<Found<AnyAsked, AnyFound>> {
         frame: params.clusters.frame.name().to_owned(),
         allocate: params.clusters.allocate.name().to_owned(),
         rounding: params.clusters.rounding.name().to_owned(),
-    });
+    }));
     Ok(
         Found::new(asked, AnyFound::Encode(Box::new(stats)), summary)
             .accuracy(accuracy)

@@ -108,7 +108,7 @@ impl Fields {
         let here = (2.0 * before[rank] + earlier[rank] + 0.5 * first[rank]) * (1.0 / 3.5);
         let level = hierarchy.level(rank);
         let all = (coarser + beside + here + last) * 0.25;
-        let [coarser, beside, here, last] = [coarser, beside, here, last].map(|x| class_of(x));
+        let [coarser, beside, here, last] = [coarser, beside, here, last].map(class_of);
         Context {
             cells: [
                 coarser * Hierarchy::LEVELS + level,
