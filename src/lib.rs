@@ -11,7 +11,7 @@
 //! | 0 | [`error`] [`progress`] [`report`] [`trade`] |
 //! | 1 | [`numeric`] |
 //! | 2 | [`spatial`] [`image`] |
-//! | 3 | [`mesh`] [`camera`] |
+//! | 3 | [`mesh`] [`points`] [`camera`] |
 //! | 4 | [`volume`] |
 //! | 5 | [`render`] [`protein`] [`anim`] |
 //! | 6 | [`measure`] [`io`] (used by commands alone) |
@@ -25,6 +25,7 @@ pub mod io;
 pub mod measure;
 pub mod mesh;
 pub mod numeric;
+pub mod points;
 pub mod progress;
 pub mod protein;
 pub mod render;

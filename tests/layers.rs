@@ -17,6 +17,12 @@ const MAY_USE: &[(&str, &[&str])] = &[
         "mesh",
         &["error", "numeric", "progress", "report", "spatial"],
     ),
+    (
+        "points",
+        &[
+            "error", "mesh", "numeric", "progress", "report", "spatial", "trade",
+        ],
+    ),
     ("camera", &["numeric", "spatial"]),
     (
         "volume",
@@ -27,8 +33,8 @@ const MAY_USE: &[(&str, &[&str])] = &[
     (
         "render",
         &[
-            "camera", "error", "image", "mesh", "numeric", "progress", "report", "spatial",
-            "trade", "volume",
+            "camera", "error", "image", "mesh", "numeric", "points", "progress", "report",
+            "spatial", "trade", "volume",
         ],
     ),
     (
@@ -46,7 +52,7 @@ const MAY_USE: &[(&str, &[&str])] = &[
     (
         "measure",
         &[
-            "anim", "error", "image", "mesh", "numeric", "progress", "protein", "report",
+            "anim", "error", "image", "mesh", "numeric", "points", "progress", "protein", "report",
             "spatial", "trade", "volume",
         ],
     ),
@@ -54,7 +60,8 @@ const MAY_USE: &[(&str, &[&str])] = &[
     (
         "io",
         &[
-            "anim", "error", "image", "mesh", "numeric", "protein", "report", "spatial", "volume",
+            "anim", "error", "image", "mesh", "numeric", "points", "protein", "report", "spatial",
+            "volume",
         ],
     ),
 ];

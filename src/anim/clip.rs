@@ -96,6 +96,7 @@ impl Clip {
             points: self.mesh.points.clone(),
             sides: self.mesh.sides.clone(),
             colors: self.mesh.colors.clone(),
+            classes: self.mesh.classes.clone(),
             normals,
         }
     }

@@ -35,6 +35,8 @@ pub struct Mesh {
     pub sides: Option<Vec<[i32; 2]>>,
     /// One colour per vertex: red, green, blue, alpha from 0 to 1, as stored.
     pub colors: Option<Vec<[f32; 4]>>,
+    /// One class per vertex, as LAS numbers them (2 is ground, 6 is a building).
+    pub classes: Option<Vec<u8>>,
 }
 
 /// Faces of any number of corners: face `f` has corners `corners[starts[f]..starts[f + 1]]`.

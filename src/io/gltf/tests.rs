@@ -260,6 +260,7 @@ fn meshes() -> impl Strategy<Value = Mesh> {
                 points: singles.into_iter().map(|v| v % n).collect(),
                 polygons: None,
                 sides: None,
+                classes: None,
             }
         })
 }
