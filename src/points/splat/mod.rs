@@ -1,0 +1,3 @@
+//! Discs that cover a cloud.
+mod disc;
+pub use disc::{Splat, Splats};
