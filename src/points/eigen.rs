@@ -43,18 +43,17 @@ fn closed_form(m: &Symmetric) -> Option<(Vec3, Vec3)> {
         return None;
     }
     // The rows of what is left are across the vector: two of them span the plane.
-    let rows = [
-        [xx - low, xy, xz],
-        [xy, yy - low, yz],
-        [xz, yz, zz - low],
-    ];
+    let rows = [[xx - low, xy, xz], [xy, yy - low, yz], [xz, yz, zz - low]];
     let crossed = [
         cross(rows[0], rows[1]),
         cross(rows[1], rows[2]),
         cross(rows[2], rows[0]),
     ];
     let squares = crossed.map(|v| dot(v, v));
-    let best = (0..3).fold(0, |best, i| if squares[i] > squares[best] { i } else { best });
+    let best = (0..3).fold(
+        0,
+        |best, i| if squares[i] > squares[best] { i } else { best },
+    );
     let vector = scale(crossed[best], 1.0 / squares[best].sqrt());
     Some(([low, middle, high], vector))
 }

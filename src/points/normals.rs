@@ -98,7 +98,11 @@ fn plane(tree: &KdTree, points: &[Vec3], near: &Neighbourhoods, i: usize) -> Pla
         best = (values, normal, count);
     }
     let (values, normal, count) = best;
-    let rank = if count > row.len() { count } else { DENSITY_RANK };
+    let rank = if count > row.len() {
+        count
+    } else {
+        DENSITY_RANK
+    };
     let wide: Vec<u32> = found
         .iter()
         .map(|n| n.index)

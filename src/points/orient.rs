@@ -65,7 +65,11 @@ impl Forest {
         }
         let change = (a ^ b ^ u32::from(differ)) & 1;
         // The smaller index becomes the root: with halving, no rank is needed.
-        let (root, other) = if a < b { (a >> 1, b >> 1) } else { (b >> 1, a >> 1) };
+        let (root, other) = if a < b {
+            (a >> 1, b >> 1)
+        } else {
+            (b >> 1, a >> 1)
+        };
         self.links[other as usize] = root << 1 | change;
         true
     }
@@ -241,7 +245,14 @@ fn outwards(
         let known = &extremes[part];
         let vote = vote(known, &directions, normals);
         let beside = if vote.abs() < CLEAR {
-            beside(tree, points, normals, parts, members.of_part(part), &settled)
+            beside(
+                tree,
+                points,
+                normals,
+                parts,
+                members.of_part(part),
+                &settled,
+            )
         } else {
             0.0
         };
@@ -299,7 +310,10 @@ fn beside(
         let i = i as usize;
         let mut near = Vec::new();
         tree.nearest(points[i], 2, &mut near);
-        let first = near.last().map_or(1.0, |n| n.distance_squared).max(f64::MIN_POSITIVE);
+        let first = near
+            .last()
+            .map_or(1.0, |n| n.distance_squared)
+            .max(f64::MIN_POSITIVE);
         let other = tree
             .stream(points[i], 64.0 * first)
             .take(LOOKS)
@@ -313,7 +327,11 @@ fn beside(
             }
         }
     }
-    if f64::abs(sum) > CLEAR * all { sum } else { 0.0 }
+    if f64::abs(sum) > CLEAR * all {
+        sum
+    } else {
+        0.0
+    }
 }
 
 /// The points of each part.
@@ -363,4 +381,22 @@ pub fn upwards(normals: &mut [Vec3]) {
             *normal = scale(*normal, -1.0);
         }
     });
+}
+
+/// The parts of a cloud that neighbours connect, where nothing is turned.
+pub fn connected(normals: &[Vec3], near: &Neighbourhoods) -> Parts {
+    let mut forest = Forest::new(normals.len());
+    for i in 0..normals.len() {
+        for &j in near.row(i).iter().take(EDGES) {
+            if normals[i] != [0.0; 3] && normals[j as usize] != [0.0; 3] {
+                forest.join(i as u32, j, false);
+            }
+        }
+    }
+    let is_root =
+        |i: &u32| normals[*i as usize] != [0.0; 3] && forest.links[*i as usize] >> 1 == *i;
+    Parts {
+        count: (0..normals.len() as u32).filter(is_root).count() as u64,
+        joined: 0,
+    }
 }

@@ -200,13 +200,7 @@ impl KdTree {
 
     /// The points at squared distances up to `reach` that come after `last` (all where it is `None`),
     /// in no order that means anything, but always the same.
-    pub fn within(
-        &self,
-        p: Vec3,
-        reach: f64,
-        last: Option<Neighbour>,
-        found: &mut Vec<Neighbour>,
-    ) {
+    pub fn within(&self, p: Vec3, reach: f64, last: Option<Neighbour>, found: &mut Vec<Neighbour>) {
         found.clear();
         let last = last.unwrap_or(Neighbour::FIRST);
         self.search(p, &mut Ball { reach, last, found });

@@ -20,7 +20,9 @@ impl Length {
     /// The length of its name: `0.1`, or `0.5%` of the diagonal.
     pub fn from_name(name: &str) -> Option<Self> {
         match name.strip_suffix('%') {
-            Some(percent) => Some(Length::OfDiagonal(percent.trim().parse::<f64>().ok()? / 100.0)),
+            Some(percent) => Some(Length::OfDiagonal(
+                percent.trim().parse::<f64>().ok()? / 100.0,
+            )),
             None => name.parse().ok().map(Length::Absolute),
         }
     }
@@ -179,7 +181,8 @@ impl Params {
     };
 
     /// Fewest and most neighbours.
-    pub const NEIGHBORS: std::ops::RangeInclusive<usize> = 3..=crate::points::normals::MOST_NEIGHBOURS;
+    pub const NEIGHBORS: std::ops::RangeInclusive<usize> =
+        3..=crate::points::normals::MOST_NEIGHBOURS;
 
     /// Errs when a value is out of its range.
     pub fn check(&self) -> Result<()> {
