@@ -15,8 +15,10 @@ const GAP: f64 = 3.0;
 const ISOLATED: f64 = 8.0;
 /// Points below which a shell is taken one by one.
 const FEW: usize = 24;
-/// Each shell is so much farther out, by the square of the distance.
-const SHELL: f64 = 2.0;
+/// Each shell is so much farther out at least, and at most, by the square of the distance.
+const SHELL: [f64; 2] = [1.5, 8.0];
+/// The first tries to end so much beyond the last disc, which was near and as large as a rule.
+const GUESS: f64 = 1.05;
 /// Bins by which a shell is searched for gaps; more are not worth it.
 const BINS: usize = 128;
 /// Neighbours whose spacing, with the point's own, has its median taken.
@@ -73,6 +75,8 @@ pub struct Growth {
     /// Distance of the last point that was looked at, in space.
     last: f64,
     spacing: f64,
+    /// Square of the radius of the disc before.
+    guess: f64,
     shell: Vec<Neighbour>,
     wide: Vec<u32>,
 }
@@ -245,7 +249,10 @@ impl Growth {
     fn shells(&mut self, cloud: &Cloud, mut last: Option<Neighbour>, bounds: &Bounds) {
         let centre = cloud.points[self.source as usize];
         let first = last.map_or(0.0, |n| n.distance_squared);
-        let mut reach = first.max(self.spacing * self.spacing) * SHELL;
+        let first = first.max(self.spacing * self.spacing);
+        let guess = GUESS * self.guess;
+        let next = |reach: f64| guess.clamp(SHELL[0] * reach, SHELL[1] * reach);
+        let mut reach = next(first);
         let mut shell = std::mem::take(&mut self.shell);
         loop {
             cloud.tree.within(centre, reach, last, &mut shell);
@@ -260,7 +267,7 @@ impl Growth {
             }
             let farthest = shell.iter().max_by(|a, b| a.order(b));
             last = farthest.copied().or(last);
-            reach *= SHELL;
+            reach = next(reach);
         }
         self.shell = shell;
     }
@@ -332,6 +339,7 @@ impl Growth {
         self.offset = middle.clamp(-bounds.delta, bounds.delta);
         self.error = (self.high - self.offset).max(self.offset - self.low);
         self.radius = self.reach.sqrt();
+        self.guess = self.reach;
         if self.radius == 0.0 && cloud.points.len() > 1 {
             self.radius = self.spacing;
         }

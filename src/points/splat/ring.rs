@@ -2,8 +2,8 @@
 
 use crate::numeric::vector::{Vec3, cross};
 
-/// Most corners of a cell: four, and one for each neighbour that cuts it.
-const MOST: usize = 72;
+/// Most corners of a cell: six as a rule. What would add more is passed over.
+const MOST: usize = 24;
 /// Half the side of the square in which a cell is cut out, in the spacing: neighbours farther than
 /// three times the spacing are across a gap, and touch no cell.
 const HALF: f64 = 1.5;
@@ -56,52 +56,45 @@ impl Cell {
     pub fn cut(&mut self, q: [f64; 2], owner: u32) {
         let square = q[0] * q[0] + q[1] * q[1];
         // Half of the way to it, squared.
-        if 0.25 * square >= self.reach || square == 0.0 || self.count + 1 > MOST {
+        if 0.25 * square >= self.reach || square == 0.0 || self.count == MOST {
             return;
         }
         let half = 0.5 * square;
-        let side = |c: &Corner| c.at[0] * q[0] + c.at[1] * q[1] - half;
         let mut sides = [0.0; MOST];
         let mut cut = false;
-        for (side_of, corner) in sides.iter_mut().zip(&self.corners[..self.count]) {
-            *side_of = side(corner);
-            cut |= *side_of > 0.0;
+        for (side, corner) in sides.iter_mut().zip(&self.corners[..self.count]) {
+            *side = corner.at[0] * q[0] + corner.at[1] * q[1] - half;
+            cut |= *side > 0.0;
         }
         if !cut {
             return;
         }
-        let mut kept = [Corner::default(); MOST];
-        let mut count = 0;
-        let mut push = |corner: Corner| {
-            kept[count] = corner;
-            count += 1;
-        };
-        for i in 0..self.count {
-            let j = if i + 1 == self.count { 0 } else { i + 1 };
-            let (a, b) = (&self.corners[i], &self.corners[j]);
+        let corners = self.corners;
+        let count = self.count;
+        self.count = 0;
+        for i in 0..count {
+            let j = if i + 1 == count { 0 } else { i + 1 };
+            let (a, b) = (corners[i], corners[j]);
             let (sa, sb) = (sides[i], sides[j]);
-            let between = || {
-                let t = sa / (sa - sb);
-                [
-                    a.at[0] + t * (b.at[0] - a.at[0]),
-                    a.at[1] + t * (b.at[1] - a.at[1]),
-                ]
-            };
             if sa <= 0.0 {
-                push(*a);
-                if sb > 0.0 {
-                    let at = between();
-                    push(Corner { at, owner });
-                }
-            } else if sb <= 0.0 {
-                let at = between();
-                push(Corner { at, owner: a.owner });
+                self.push(a);
+            }
+            if (sa <= 0.0) != (sb <= 0.0) {
+                let t = sa / (sa - sb);
+                let at = std::array::from_fn(|c| a.at[c] + t * (b.at[c] - a.at[c]));
+                let owner = if sa <= 0.0 { owner } else { a.owner };
+                self.push(Corner { at, owner });
             }
         }
-        self.corners = kept;
-        self.count = count;
+        let count = self.count;
         let far = |c: &Corner| c.at[0] * c.at[0] + c.at[1] * c.at[1];
         self.reach = self.corners[..count].iter().map(far).fold(0.0, f64::max);
+    }
+
+    #[inline]
+    fn push(&mut self, corner: Corner) {
+        self.corners[self.count] = corner;
+        self.count += 1;
     }
 
     /// Those who cut sides that are left: the natural neighbours.
