@@ -10,6 +10,7 @@ pub mod report_difference;
 mod sides;
 pub mod smooth_error;
 pub mod stability;
+pub mod splat_cover;
 mod surface;
 #[cfg(test)]
 mod test_shapes;
