@@ -60,6 +60,8 @@ pub enum Format {
     Gltf,
     /// glTF 2.0, binary.
     Glb,
+    /// Point Cloud Data of the Point Cloud Library.
+    Pcd,
     /// Nearly Raw Raster Data.
     Nrrd,
     /// MetaImage header with a data file.
@@ -104,11 +106,35 @@ pub enum Format {
 #[derive(Debug, Clone, Copy)]
 #[allow(missing_docs)]
 pub struct Holds {
+    pub faces: bool,
     pub polygons: bool,
     pub segments: bool,
     pub points: bool,
     pub normals: bool,
     pub colors: bool,
+    pub classes: bool,
+}
+
+impl Holds {
+    /// Triangles alone.
+    const TRIANGLES: Holds = Holds {
+        faces: true,
+        polygons: false,
+        segments: false,
+        points: false,
+        normals: false,
+        colors: false,
+        classes: false,
+    };
+    /// Vertices alone, with what they carry.
+    const CLOUD: Holds = Holds {
+        faces: false,
+        points: true,
+        normals: true,
+        colors: true,
+        classes: true,
+        ..Holds::TRIANGLES
+    };
 }
 
 /// A row of the table of formats.
@@ -182,6 +208,13 @@ const TABLE: &[Row] = &[
         Kind::Mesh,
         (true, true),
         "glTF 2.0 in one binary file",
+    ),
+    row(
+        Format::Pcd,
+        &["pcd"],
+        Kind::Mesh,
+        (true, true),
+        "PCD, point clouds in ascii, binary and binary_compressed; written binary",
     ),
     row(
         Format::Nrrd,
@@ -393,37 +426,31 @@ impl Format {
                 polygons: true,
                 segments: true,
                 points: true,
-                normals: false,
                 colors: true,
+                ..Holds::TRIANGLES
             },
             Format::Ply => Holds {
                 polygons: true,
                 segments: true,
-                points: true,
-                normals: true,
-                colors: true,
+                ..Holds {
+                    faces: true,
+                    ..Holds::CLOUD
+                }
             },
             Format::Off => Holds {
                 polygons: true,
-                segments: false,
-                points: false,
-                normals: false,
                 colors: true,
+                ..Holds::TRIANGLES
             },
             Format::Glb => Holds {
-                polygons: false,
                 segments: true,
                 points: true,
                 normals: true,
                 colors: true,
+                ..Holds::TRIANGLES
             },
-            _ => Holds {
-                polygons: false,
-                segments: false,
-                points: false,
-                normals: false,
-                colors: false,
-            },
+            Format::Pcd => Holds::CLOUD,
+            _ => Holds::TRIANGLES,
         }
     }
 }
@@ -448,6 +475,9 @@ pub fn sniff(bytes: &[u8], extension: Option<&str>) -> Result<Format, Fault> {
     }
     if bytes.starts_with(b"#binvox") {
         return Ok(Format::Binvox);
+    }
+    if super::pcd::is_document(bytes) {
+        return Ok(Format::Pcd);
     }
     if bytes.starts_with(super::svo::MAGIC) {
         return Ok(Format::Svo);

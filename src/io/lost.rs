@@ -1,7 +1,7 @@
 //! What of a mesh, a molecule or an animation a format leaves out.
 
 use super::format::Format;
-use super::{pdb, pointcache};
+use super::{pcd, pdb, pointcache};
 use crate::anim::Clip;
 use crate::mesh::{Mesh, Polygons};
 use crate::protein::Molecule;
@@ -128,6 +128,17 @@ pub fn dropped(mesh: &Mesh, format: Format) -> Vec<Warning> {
             mesh.colors.as_ref().map_or(0, Vec::len),
         );
     }
+    if !holds.classes {
+        note(
+            "dropped-classes",
+            "classes of vertices",
+            mesh.classes.as_ref().map_or(0, Vec::len),
+        );
+    }
+    if !holds.faces {
+        note("dropped-faces", "faces", mesh.face_count());
+        return lost_of_cloud(mesh, format, lost);
+    }
     if format != Format::Ply {
         note(
             "dropped-labels",
@@ -149,6 +160,29 @@ pub fn dropped(mesh: &Mesh, format: Format) -> Vec<Warning> {
             "faces of more than three corners",
             mesh.polygons.as_ref().map_or(0, Polygons::len),
         );
+    }
+    lost
+}
+
+/// What else a format leaves out that holds all vertices and nothing but them.
+fn lost_of_cloud(mesh: &Mesh, format: Format, mut lost: Vec<Warning>) -> Vec<Warning> {
+    let name = format.name();
+    let mut note = |code: &str, message: String, count: u64, first: Option<u64>| {
+        if count > 0 {
+            lost.push(Warning::new(code, message, count, first));
+        }
+    };
+    let message = format!("{name} files hold no polylines; left out");
+    note(
+        "dropped-segments",
+        message,
+        mesh.segments.len() as u64,
+        None,
+    );
+    if format == Format::Pcd {
+        let (count, first) = pcd::rounded_colors(mesh);
+        let message = format!("{name} files hold colours in bytes; rounded");
+        note("rounded-colours", message, count, first);
     }
     lost
 }

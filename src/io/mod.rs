@@ -7,6 +7,7 @@
 
 mod base64;
 pub mod binvox;
+mod cloud;
 pub mod format;
 mod gather;
 pub mod gltf;
@@ -23,6 +24,7 @@ pub mod nrrd;
 pub mod obj;
 pub mod off;
 pub mod pc2;
+pub mod pcd;
 pub mod pdb;
 #[cfg(test)]
 mod peers;
@@ -54,7 +56,7 @@ use crate::error::{Error, Fault, Result};
 use crate::image::samples::Image;
 use crate::mesh::Mesh;
 use crate::protein::Molecule;
-use crate::report::{self, Input, Output, Warning};
+use crate::report::{self, Input, Output, Tally, Warning};
 use crate::volume::Volume;
 use crate::volume::bits::BitGrid;
 use format::{Format, Kind};
@@ -142,12 +144,13 @@ fn input(source: &Source, format: Format, digest: String, content: report::Conte
 }
 
 fn parse(source: &Source, format: Format, warnings: &mut Vec<Warning>) -> Result<Content, Refusal> {
-    let content = match format {
+    let mut content = match format {
         Format::Obj => Content::Mesh(obj::read(source, warnings)?),
         Format::Ply => Content::Mesh(ply::read(source, warnings)?),
         Format::Stl => Content::Mesh(stl::read(source, warnings)?),
         Format::Off => Content::Mesh(off::read(source, warnings)?),
         Format::Gltf | Format::Glb => Content::Mesh(gltf::read(source, warnings)?),
+        Format::Pcd => Content::Mesh(pcd::read(source, warnings)?),
         Format::Nrrd => Content::Volume(nrrd::read(source, warnings)?),
         Format::Mhd | Format::Mha => Content::Volume(metaimage::read(source, warnings)?),
         Format::Nifti => Content::Volume(nifti::read(source, warnings)?),
@@ -167,8 +170,8 @@ fn parse(source: &Source, format: Format, warnings: &mut Vec<Warning>) -> Result
         Format::Json => Content::Report(json::read(source, warnings)?),
         Format::Vdb => return Err(Fault::whole("vdb files are written, not read").into()),
     };
-    match &content {
-        Content::Mesh(mesh) => mesh.check()?,
+    match &mut content {
+        Content::Mesh(mesh) => settle(mesh, source, warnings)?,
         Content::Volume(volume) => volume.check()?,
         Content::Image(image) => image.check()?,
         Content::Molecule(molecule) => molecule.check()?,
@@ -176,6 +179,28 @@ fn parse(source: &Source, format: Format, warnings: &mut Vec<Warning>) -> Result
         Content::Report(_) => {}
     }
     Ok(content)
+}
+
+/// Holds a mesh to what every reader promises, once bad points of a cloud are left out where the source
+/// asks for that.
+fn settle(mesh: &mut Mesh, source: &Source, warnings: &mut Vec<Warning>) -> Result<(), Fault> {
+    if !mesh.is_cloud() {
+        return mesh.check();
+    }
+    if source.skips_bad() {
+        cloud::skip_bad(mesh, warnings);
+        if mesh.positions.is_empty() {
+            return Err(Fault::whole("holds no points that are finite"));
+        }
+    }
+    mesh.check().map_err(|fault| fault.with_hint(cloud::SKIP))?;
+    let normals = mesh.normals.iter().flatten().zip(0u64..);
+    let mut zero = Tally::default();
+    normals
+        .filter(|(normal, _)| **normal == [0.0; 3])
+        .for_each(|(_, v)| zero.note(v));
+    zero.warn("zero-normals", "normals without a direction", warnings);
+    Ok(())
 }
 
 /// The files beside an input that reading it opens too: those its header names.
@@ -320,6 +345,7 @@ pub fn write_mesh(mesh: &Mesh, sink: &Sink, format: Format) -> Result<(Vec<Outpu
         Format::Stl => stl::write,
         Format::Off => off::write,
         Format::Glb => gltf::write,
+        Format::Pcd => pcd::write,
         _ => return Err(cannot_hold(format, Kind::Mesh)),
     };
     let output = sink.write(format, |out| writer(mesh, out))?;
