@@ -110,6 +110,16 @@ pub fn is_of_bytes(color: &[f32]) -> bool {
     color.iter().all(is_whole)
 }
 
+/// How many colours are not whole bytes, and the first of them.
+pub fn rounded_colors(mesh: &Mesh) -> (u64, Option<u64>) {
+    let colors = mesh.colors.iter().flatten();
+    let mut rounded = (0u64..)
+        .zip(colors)
+        .filter(|(_, color)| !is_of_bytes(&color[..]));
+    let first = rounded.next().map(|(v, _)| v);
+    (first.map_or(0, |_| 1) + rounded.count() as u64, first)
+}
+
 /// Warns of fields that are not read, by their names.
 pub fn warn_of_ignored(names: &[String], warnings: &mut Vec<Warning>) {
     const SHOWN: usize = 12;

@@ -7,6 +7,8 @@ use crate::error::Fault;
 pub enum Kind {
     /// Triangles, polylines, points.
     Mesh,
+    /// Discs with a field of normals.
+    Splats,
     /// Voxels.
     Volume,
     /// Pixels.
@@ -24,6 +26,7 @@ impl Kind {
     pub fn name(self) -> &'static str {
         match self {
             Kind::Mesh => "mesh",
+            Kind::Splats => "splats",
             Kind::Volume => "volume",
             Kind::Image => "image",
             Kind::Molecule => "molecule",
@@ -36,6 +39,7 @@ impl Kind {
     pub fn with_article(self) -> &'static str {
         match self {
             Kind::Mesh => "a mesh",
+            Kind::Splats => "a set of splats",
             Kind::Volume => "a volume",
             Kind::Image => "an image",
             Kind::Molecule => "a molecule",
@@ -62,6 +66,18 @@ pub enum Format {
     Glb,
     /// Point Cloud Data of the Point Cloud Library.
     Pcd,
+    /// Laser scans as the ASPRS exchanges them.
+    Las,
+    /// Laser scans packed by LASzip.
+    Laz,
+    /// Points, of words.
+    Xyz,
+    /// Points, of words parted by commas.
+    PointsCsv,
+    /// scantle's PLY of splats.
+    Splats,
+    /// PLY of 3D Gaussians.
+    Gaussians,
     /// Nearly Raw Raster Data.
     Nrrd,
     /// MetaImage header with a data file.
@@ -217,6 +233,57 @@ const TABLE: &[Row] = &[
         "PCD, point clouds in ascii, binary and binary_compressed; written binary",
     ),
     row(
+        Format::Las,
+        &["las"],
+        Kind::Mesh,
+        (true, true),
+        "LAS 1.0 to 1.4, point formats 0 to 10; written as 1.4",
+    ),
+    row(
+        Format::Laz,
+        &["laz"],
+        Kind::Mesh,
+        (true, true),
+        "LAZ: LAS whose points are packed by LASzip",
+    ),
+    row(
+        Format::Xyz,
+        &["xyz", "xyzn", "pts", "asc", "txt"],
+        Kind::Mesh,
+        (true, true),
+        "XYZ: a point on each line, with a normal, a colour or both",
+    ),
+    Row {
+        name: "points-csv",
+        ..row(
+            Format::PointsCsv,
+            &["csv"],
+            Kind::Mesh,
+            (true, true),
+            "points whose columns have names: x, y, z, nx, ny, nz, red, green, blue, classification",
+        )
+    },
+    Row {
+        name: "splats",
+        ..row(
+            Format::Splats,
+            &["ply"],
+            Kind::Splats,
+            (true, true),
+            "scantle's PLY of discs with a field of normals",
+        )
+    },
+    Row {
+        name: "gaussians",
+        ..row(
+            Format::Gaussians,
+            &["ply"],
+            Kind::Splats,
+            (true, true),
+            "PLY of 3D Gaussians of degree 0, in single precision",
+        )
+    },
+    row(
         Format::Nrrd,
         &["nrrd"],
         Kind::Volume,
@@ -354,6 +421,9 @@ const TABLE: &[Row] = &[
     ),
 ];
 
+/// Formats whose extension is that of another, which is the one that it tells.
+const SHARING: [Format; 3] = [Format::PointsCsv, Format::Splats, Format::Gaussians];
+
 impl Format {
     /// All formats, in the order of the table.
     pub fn all() -> impl Iterator<Item = Format> {
@@ -410,13 +480,27 @@ impl Format {
             .map(|row| row.format)
     }
 
-    /// The format of a file name extension, in any case.
+    /// The format of a file name extension, in any case; see [`Format::holding`] for the extensions that
+    /// formats of several kinds share.
     pub fn from_extension(extension: &str) -> Option<Format> {
         let wanted = extension.to_ascii_lowercase();
         TABLE
             .iter()
-            .find(|row| row.extensions.contains(&wanted.as_str()))
-            .map(|row| row.format)
+            .map(|row| (row.format, row.extensions))
+            .filter(|(format, _)| !SHARING.contains(format))
+            .find(|(_, extensions)| extensions.contains(&wanted.as_str()))
+            .map(|(format, _)| format)
+    }
+
+    /// This format, or the one that files of its extension are in where they hold another kind.
+    ///
+    /// `.csv` may be of spheres or of points, `.ply` of a mesh or of splats.
+    pub fn holding(self, kind: Kind) -> Format {
+        match (self, kind) {
+            (Format::Ply, Kind::Splats) => Format::Splats,
+            (Format::SpheresCsv, Kind::Mesh) => Format::PointsCsv,
+            _ => self,
+        }
     }
 
     /// What a mesh may have beside triangles and be held by the writer of this format.
@@ -449,7 +533,15 @@ impl Format {
                 colors: true,
                 ..Holds::TRIANGLES
             },
-            Format::Pcd => Holds::CLOUD,
+            Format::Pcd | Format::PointsCsv => Holds::CLOUD,
+            Format::Las | Format::Laz => Holds {
+                normals: false,
+                ..Holds::CLOUD
+            },
+            Format::Xyz => Holds {
+                classes: false,
+                ..Holds::CLOUD
+            },
             _ => Holds::TRIANGLES,
         }
     }
@@ -462,7 +554,7 @@ impl Format {
 pub fn sniff(bytes: &[u8], extension: Option<&str>) -> Result<Format, Fault> {
     let by_name = extension.and_then(Format::from_extension);
     if bytes.starts_with(b"ply\n") || bytes.starts_with(b"ply\r") {
-        return Ok(Format::Ply);
+        return Ok(super::splats::kind_of(bytes).unwrap_or(Format::Ply));
     }
     if bytes.starts_with(b"glTF") {
         return Ok(Format::Glb);
@@ -475,6 +567,9 @@ pub fn sniff(bytes: &[u8], extension: Option<&str>) -> Result<Format, Fault> {
     }
     if bytes.starts_with(b"#binvox") {
         return Ok(Format::Binvox);
+    }
+    if let Some(is_packed) = super::las::is_packed(bytes) {
+        return Ok(if is_packed { Format::Laz } else { Format::Las });
     }
     if super::pcd::is_document(bytes) {
         return Ok(Format::Pcd);
@@ -504,7 +599,11 @@ pub fn sniff(bytes: &[u8], extension: Option<&str>) -> Result<Format, Fault> {
     if by_name == Some(Format::Stl) || super::stl::is_binary(bytes) {
         return Ok(Format::Stl);
     }
-    if let Some(format) = by_name {
+    if by_name == Some(Format::SpheresCsv) && super::xyz::is_document(bytes) {
+        return Ok(Format::PointsCsv);
+    }
+    // Names such as `.txt` tell little: whatever text is known goes before them.
+    if let Some(format) = by_name.filter(|format| *format != Format::Xyz) {
         return Ok(format);
     }
     if super::mdd::is_exact(bytes) {
@@ -534,6 +633,9 @@ pub fn sniff(bytes: &[u8], extension: Option<&str>) -> Result<Format, Fault> {
     }
     if super::xyzr::is_document(text) {
         return Ok(Format::SpheresCsv);
+    }
+    if by_name == Some(Format::Xyz) || super::xyz::is_document(text) {
+        return Ok(Format::Xyz);
     }
     let names: Vec<_> = Format::all()
         .filter(|f| f.is_read())

@@ -14,6 +14,7 @@ pub mod gltf;
 mod header;
 mod hybrid36;
 pub mod json;
+pub mod las;
 mod lost;
 pub mod mdd;
 pub mod metaimage;
@@ -38,12 +39,14 @@ mod sanim;
 pub mod sequence;
 pub mod sink;
 pub mod source;
+pub mod splats;
 pub mod stl;
 pub mod svo;
 mod text;
 pub mod vdb;
 pub mod vti;
 mod xml;
+pub mod xyz;
 pub mod xyzr;
 
 #[cfg(test)]
@@ -55,12 +58,13 @@ use crate::anim::Clip;
 use crate::error::{Error, Fault, Result};
 use crate::image::samples::Image;
 use crate::mesh::Mesh;
+use crate::points::Splats;
 use crate::protein::Molecule;
 use crate::report::{self, Input, Output, Tally, Warning};
 use crate::volume::Volume;
 use crate::volume::bits::BitGrid;
 use format::{Format, Kind};
-use lost::{dropped, dropped_of_clip, dropped_of_molecule};
+use lost::{dropped, dropped_of_clip, dropped_of_molecule, dropped_of_splats};
 use refusal::Refusal;
 use serde_json::Value;
 use sink::Sink;
@@ -73,6 +77,8 @@ use std::path::{Path, PathBuf};
 pub enum Content {
     /// Triangles, polylines, points.
     Mesh(Mesh),
+    /// Discs with a field of normals.
+    Splats(Splats),
     /// Voxels.
     Volume(Volume),
     /// Pixels.
@@ -90,6 +96,7 @@ impl Content {
     pub fn kind(&self) -> Kind {
         match self {
             Content::Mesh(_) => Kind::Mesh,
+            Content::Splats(_) => Kind::Splats,
             Content::Volume(_) => Kind::Volume,
             Content::Image(_) => Kind::Image,
             Content::Molecule(_) => Kind::Molecule,
@@ -119,6 +126,7 @@ pub fn read(source: &Source, format: Option<Format>) -> Result<(Content, Input, 
     let content = content.map_err(|refusal| refusal.of(source))?;
     let described = match &content {
         Content::Mesh(mesh) => mesh.content(),
+        Content::Splats(splats) => splats::content(splats),
         Content::Volume(volume) => volume.content(),
         Content::Image(image) => image.content(),
         Content::Molecule(molecule) => molecule.content(),
@@ -151,6 +159,10 @@ fn parse(source: &Source, format: Format, warnings: &mut Vec<Warning>) -> Result
         Format::Off => Content::Mesh(off::read(source, warnings)?),
         Format::Gltf | Format::Glb => Content::Mesh(gltf::read(source, warnings)?),
         Format::Pcd => Content::Mesh(pcd::read(source, warnings)?),
+        Format::Las | Format::Laz => Content::Mesh(las::read(source, warnings)?),
+        Format::Xyz | Format::PointsCsv => Content::Mesh(xyz::read(source, warnings)?),
+        Format::Splats => Content::Splats(splats::read(source, warnings)?),
+        Format::Gaussians => Content::Splats(splats::read_gaussians(source, warnings)?),
         Format::Nrrd => Content::Volume(nrrd::read(source, warnings)?),
         Format::Mhd | Format::Mha => Content::Volume(metaimage::read(source, warnings)?),
         Format::Nifti => Content::Volume(nifti::read(source, warnings)?),
@@ -172,6 +184,7 @@ fn parse(source: &Source, format: Format, warnings: &mut Vec<Warning>) -> Result
     };
     match &mut content {
         Content::Mesh(mesh) => settle(mesh, source, warnings)?,
+        Content::Splats(splats) => splats::check(splats)?,
         Content::Volume(volume) => volume.check()?,
         Content::Image(image) => image.check()?,
         Content::Molecule(molecule) => molecule.check()?,
@@ -244,6 +257,17 @@ pub fn read_mesh(source: &Source, format: Option<Format>) -> Result<(Mesh, Input
     match read(source, format)? {
         (Content::Mesh(mesh), input, warnings) => Ok((mesh, input, warnings)),
         (other, input, _) => Err(wrong_kind(source, &input.format, &other, &[Kind::Mesh])),
+    }
+}
+
+/// Reads splats; a file of another kind is an error.
+pub fn read_splats(
+    source: &Source,
+    format: Option<Format>,
+) -> Result<(Splats, Input, Vec<Warning>)> {
+    match read(source, format)? {
+        (Content::Splats(splats), input, warnings) => Ok((splats, input, warnings)),
+        (other, input, _) => Err(wrong_kind(source, &input.format, &other, &[Kind::Splats])),
     }
 }
 
@@ -346,10 +370,29 @@ pub fn write_mesh(mesh: &Mesh, sink: &Sink, format: Format) -> Result<(Vec<Outpu
         Format::Off => off::write,
         Format::Glb => gltf::write,
         Format::Pcd => pcd::write,
+        Format::Las => las::write,
+        Format::Laz => las::write_packed,
+        Format::Xyz => xyz::write,
+        Format::PointsCsv => xyz::write_csv,
         _ => return Err(cannot_hold(format, Kind::Mesh)),
     };
     let output = sink.write(format, |out| writer(mesh, out))?;
     Ok((vec![output], dropped(mesh, format)))
+}
+
+/// Writes splats. Returns the lines for the report and warnings about what the format cannot hold.
+pub fn write_splats(
+    splats: &Splats,
+    sink: &Sink,
+    format: Format,
+) -> Result<(Vec<Output>, Vec<Warning>)> {
+    let writer: fn(&Splats, &mut dyn Write) -> std::io::Result<()> = match format {
+        Format::Splats => splats::write,
+        Format::Gaussians => splats::write_gaussians,
+        _ => return Err(cannot_hold(format, Kind::Splats)),
+    };
+    let output = sink.write(format, |out| writer(splats, out))?;
+    Ok((vec![output], dropped_of_splats(splats, format)))
 }
 
 /// Writes an image. Returns the lines for the report; nothing is lost.

@@ -15,7 +15,7 @@ mod values;
 mod write;
 
 pub use header::is_document;
-pub use write::{rounded_colors, write};
+pub use write::write;
 
 use super::cloud::{self, SKIP};
 use super::refusal::{RAISE, Refusal, expect_room};

@@ -280,14 +280,14 @@ fn clouds_are_written_with_all_they_carry() {
         }
         let mut bytes = Vec::new();
         write(&mesh, &mut bytes).expect("bytes");
-        assert_eq!(rounded_colors(&mesh), (0, None));
+        assert_eq!(cloud::rounded_colors(&mesh), (0, None));
         assert_eq!(
             read_bytes(&bytes).expect("points"),
             (mesh.clone(), Vec::new())
         );
     }
     mesh.colors = Some(vec![[1.0; 4], [0.3, 0.0, 0.0, 1.0]]);
-    assert_eq!(rounded_colors(&mesh), (1, Some(1)));
+    assert_eq!(cloud::rounded_colors(&mesh), (1, Some(1)));
 }
 
 proptest! {

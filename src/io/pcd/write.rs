@@ -1,6 +1,6 @@
 //! Writing: binary rows.
 
-use crate::io::cloud::{is_of_bytes, to_byte};
+use crate::io::cloud::to_byte;
 use crate::io::text::spill;
 use crate::mesh::Mesh;
 use crate::numeric::vector::Vec3;
@@ -30,16 +30,6 @@ pub fn write(mesh: &Mesh, out: &mut dyn Write) -> io::Result<()> {
         spill(&mut bytes, out)?;
     }
     out.write_all(&bytes)
-}
-
-/// How many colours are not whole bytes, and the first of them.
-pub fn rounded_colors(mesh: &Mesh) -> (u64, Option<u64>) {
-    let colors = mesh.colors.iter().flatten();
-    let mut rounded = (0u64..)
-        .zip(colors)
-        .filter(|(_, color)| !is_of_bytes(&color[..]));
-    let first = rounded.next().map(|(v, _)| v);
-    (first.map_or(0, |_| 1) + rounded.count() as u64, first)
 }
 
 /// The types chosen.

@@ -10,9 +10,11 @@
 mod faces;
 mod header;
 mod rows;
+mod table;
 mod vertices;
 mod write;
 
+pub use table::{Table, table, vertex_properties};
 pub use write::write;
 
 use crate::error::Fault;
