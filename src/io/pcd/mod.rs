@@ -59,7 +59,7 @@ pub fn read(source: &Source, warnings: &mut Vec<Warning>) -> Result<Mesh, Refusa
             let columns = values::by_rows(&header.fields);
             let bytes = &source.bytes()[header.data..];
             let length = stride(&header.fields) * header.points as usize;
-            warn_of_trailing(bytes.len() - length, warnings);
+            warn_of_trailing(&bytes[length..], warnings);
             points_of(bytes, header.points as usize, &columns, &layout, warnings)
         }
         Encoding::Compressed => {
@@ -94,10 +94,12 @@ fn check_bytes(header: &Header, source: &Source) -> Result<(), Fault> {
     Ok(())
 }
 
-fn warn_of_trailing(count: usize, warnings: &mut Vec<Warning>) {
-    if count > 0 {
+/// The library that PCD is of fills up the last page with zeros, of which there is nothing to say.
+fn warn_of_trailing(bytes: &[u8], warnings: &mut Vec<Warning>) {
+    if bytes.iter().any(|byte| *byte != 0) {
         let message = "bytes follow the last point; not read";
-        warnings.push(Warning::new("trailing-bytes", message, count as u64, None));
+        let count = bytes.len() as u64;
+        warnings.push(Warning::new("trailing-bytes", message, count, None));
     }
 }
 
@@ -144,8 +146,7 @@ fn unpacked(
     expect_room(what, all, source.limit(), RAISE)?;
     let place = |(at, problem): (usize, String)| Fault::byte(header.data + SIZES + at, problem);
     let columns = lzf::unpack(data, length).map_err(place)?;
-    // The sizes and the data are there.
-    warn_of_trailing(bytes.len() - header.data - SIZES - packed, warnings);
+    warn_of_trailing(&bytes[header.data + SIZES + packed..], warnings);
     Ok(columns)
 }
 

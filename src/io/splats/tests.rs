@@ -118,7 +118,7 @@ fn gaussians_cover_what_their_discs_do() {
     }
     let text = String::from_utf8_lossy(&written(&splats, write_gaussians)[..200]).into_owned();
     assert!(
-        text.contains("\ncomment origin 500001 4000001 11\n"),
+        text.contains("\ncomment origin 500002 4000001 11\n"),
         "{text}"
     );
 }
