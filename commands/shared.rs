@@ -29,6 +29,14 @@ pub struct InputFormat {
     pub input_format: Option<Format>,
 }
 
+/// What becomes of points that are none.
+#[derive(Debug, Args)]
+pub struct SkipBad {
+    /// Leave out points of clouds that have a number which is not finite; a warning counts them
+    #[arg(long, help_heading = IN_AND_OUT)]
+    pub skip_bad: bool,
+}
+
 /// Where the result goes.
 #[derive(Debug, Args)]
 pub struct Output {
