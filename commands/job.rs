@@ -251,6 +251,13 @@ impl<'a> Job<'a> {
         })
     }
 
+    /// Writes the result, if the user wants it, in a format that the name of its file does not tell.
+    pub fn write_splats_as(&mut self, splats: &Splats, format: Format) -> Result<()> {
+        self.write_with(Kind::Splats, |sink, _| {
+            io::write_splats(splats, sink, format)
+        })
+    }
+
     /// Whether the result is a file for each of what a placeholder stands for.
     pub fn is_pattern(&self, placeholder: &str) -> bool {
         self.output

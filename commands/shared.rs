@@ -171,6 +171,14 @@ pub fn named<T: Clone + Send + Sync + 'static>(
         .try_map(move |name| value(&name).ok_or("not a name in the list"))
 }
 
+/// What a word names; `wanted` says what it may be.
+pub fn parsed<T: Clone + Send + Sync + 'static>(
+    value: fn(&str) -> Option<T>,
+    wanted: &'static str,
+) -> impl Fn(&str) -> Result<T, String> + Clone + Send + Sync + 'static {
+    move |word| value(word).ok_or_else(|| format!("not {wanted}"))
+}
+
 /// `N` finite numbers with commas between them.
 pub fn list<const N: usize>(text: &str) -> Result<[f64; N], String> {
     let numbers: Result<Vec<f64>, _> = text.split(',').map(|word| word.trim().parse()).collect();

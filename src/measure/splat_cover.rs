@@ -7,7 +7,8 @@ use crate::numeric::sums::sum_by;
 use crate::numeric::vector::{Vec3, add, cross, dot, length, normalize, scale, sub};
 use crate::points::Splat;
 use crate::spatial::aabb::Aabb;
-use crate::spatial::bvh::Bvh;
+use crate::spatial::bvh::{Bvh, Nearest};
+use crate::spatial::kdtree::KdTree;
 use crate::spatial::local::LocalFrame;
 use rayon::prelude::*;
 use schemars::JsonSchema;
@@ -246,7 +247,10 @@ fn judge(
     let uncovered = missed.len() as u64;
     if !missed.is_empty() && !splats.is_empty() {
         let near = Discs::new(splats, frame);
-        let found: Vec<f64> = missed.par_iter().map(|s| near.distance(runs.points[*s])).collect();
+        let found: Vec<f64> = missed
+            .par_iter()
+            .map(|s| near.distance(runs.points[*s]))
+            .collect();
         for (slot, distance) in missed.iter().zip(found) {
             heights[*slot] = distance;
         }
@@ -285,15 +289,23 @@ impl Discs {
         Discs { splats, tree }
     }
 
-    fn distance(&self, p: Vec3) -> f64 {
-        let found = self.tree.nearest(p, f64::INFINITY, |i| {
+    fn find(&self, p: Vec3) -> Option<Nearest> {
+        self.tree.nearest(p, f64::INFINITY, |i| {
             let splat = &self.splats[i as usize];
             let d = sub(p, splat.centre);
             let height = dot(d, splat.normal);
             let beyond = (length(sub(d, scale(splat.normal, height))) - splat.radius).max(0.0);
             height * height + beyond * beyond
-        });
+        })
+    }
+
+    fn distance(&self, p: Vec3) -> f64 {
+        let found = self.find(p);
         found.map_or(f64::INFINITY, |n| n.distance_squared.sqrt())
+    }
+
+    fn nearest(&self, p: Vec3) -> Option<usize> {
+        self.find(p).map(|n| n.item as usize)
     }
 }
 
@@ -308,13 +320,16 @@ fn angles(
     truth: &[Vec3],
 ) -> Vec<f64> {
     let choice: Vec<AtomicU32> = heights.iter().map(|_| AtomicU32::new(u32::MAX)).collect();
-    splats.par_iter().zip(0..splats.len() as u32).for_each(|(splat, i)| {
-        each_covered(runs, &disc(splat), splat.error / unit, |slot, height| {
-            if height == heights[slot] {
-                choice[slot].fetch_min(i, Relaxed);
-            }
+    splats
+        .par_iter()
+        .zip(0..splats.len() as u32)
+        .for_each(|(splat, i)| {
+            each_covered(runs, &disc(splat), splat.error / unit, |slot, height| {
+                if height == heights[slot] {
+                    choice[slot].fetch_min(i, Relaxed);
+                }
+            });
         });
-    });
     let angle = |slot: usize| {
         let splat = splats.get(choice[slot].load(Relaxed) as usize)?;
         let d = scale(sub(runs.points[slot], disc(splat).centre), unit);
@@ -323,7 +338,10 @@ fn angles(
         let angle = length(cross(found, wanted)).atan2(dot(found, wanted));
         Some(angle.to_degrees())
     };
-    (0..heights.len()).into_par_iter().filter_map(angle).collect()
+    (0..heights.len())
+        .into_par_iter()
+        .filter_map(angle)
+        .collect()
 }
 
 /// A round piece of the surface that discs should cover.
@@ -335,6 +353,30 @@ pub struct Piece {
     pub normal: Vec3,
     /// Its radius.
     pub radius: f64,
+}
+
+/// A piece of surface around each point of a cloud, in the plane of the disc nearest to it, of half the
+/// mean distance to its six nearest neighbours; none where there is no disc.
+///
+/// Positions are finite. Cost: O(n log n).
+pub fn pieces(positions: &[Vec3], splats: &[Splat]) -> Vec<Piece> {
+    let frame = LocalFrame::around(Aabb::around(positions));
+    let local: Vec<Vec3> = positions.par_iter().map(|p| frame.to_local(*p)).collect();
+    let count = local.len().saturating_sub(1).min(6);
+    let near = KdTree::build(&local).neighbours(&local, count);
+    let discs = Discs::new(splats, &frame);
+    let piece = |(i, p): (usize, &Vec3)| {
+        let disc = discs.nearest(*p)?;
+        let others = near[i * count..(i + 1) * count].iter();
+        let ways = others.map(|o| length(sub(local[*o as usize], *p)));
+        let mean = ways.sum::<f64>() / count.max(1) as f64;
+        Some(Piece {
+            centre: positions[i],
+            normal: splats[disc].normal,
+            radius: frame.length(0.5 * mean),
+        })
+    };
+    local.par_iter().enumerate().filter_map(piece).collect()
 }
 
 /// What the surface is where holes are looked for.
@@ -374,7 +416,9 @@ pub struct Holes {
 /// judged. The views are spread as the seeds of a sunflower. Cost: for each view the pixels that discs
 /// and pieces cover.
 pub fn holes(truth: &Truth, splats: &[Splat], tolerance: f64, views: Views) -> Holes {
-    let bounds = splats.iter().fold(Aabb::EMPTY, |all, s| all.union(s.bounds()));
+    let bounds = splats
+        .iter()
+        .fold(Aabb::EMPTY, |all, s| all.union(s.bounds()));
     let bounds = match truth {
         Truth::Pieces(pieces) => pieces.iter().fold(bounds, |all, p| all.with(p.centre)),
         Truth::Rays(_) => bounds,
@@ -422,7 +466,11 @@ type Seen = Option<(f64, Vec3)>;
 
 impl Screen {
     fn new(way: Vec3, bounds: &Aabb, half: f64, size: usize) -> Self {
-        let side = if way[2].abs() < 0.9 { [0.0, 0.0, 1.0] } else { [1.0, 0.0, 0.0] };
+        let side = if way[2].abs() < 0.9 {
+            [0.0, 0.0, 1.0]
+        } else {
+            [1.0, 0.0, 0.0]
+        };
         let right = normalize(cross(way, side));
         let up = cross(right, way);
         let back = add(scale(way, 2.0), add(right, up));
@@ -515,7 +563,11 @@ mod tests {
     use crate::numeric::rng::Rng;
 
     fn disc(centre: Vec3, normal: Vec3, radius: f64, error: f64) -> Splat {
-        let side = if normal[0].abs() < 0.5 { [1.0, 0.0, 0.0] } else { [0.0, 1.0, 0.0] };
+        let side = if normal[0].abs() < 0.5 {
+            [1.0, 0.0, 0.0]
+        } else {
+            [0.0, 1.0, 0.0]
+        };
         Splat {
             centre,
             normal,
@@ -550,7 +602,12 @@ mod tests {
             .map(|i| {
                 let mut rng = Rng::new(3, i);
                 let normal = normalize(random(10_000 + i, 1.0));
-                disc(random(20_000 + i, 1.0), normal, rng.unit(), 0.3 * rng.unit())
+                disc(
+                    random(20_000 + i, 1.0),
+                    normal,
+                    rng.unit(),
+                    0.3 * rng.unit(),
+                )
             })
             .collect();
         let wanted = by_definition(&positions, &splats);

@@ -4,6 +4,7 @@ pub mod cloud;
 pub mod distance;
 pub mod identify;
 pub mod polygon;
+pub mod sampling;
 pub mod shapes;
 pub mod topology;
 pub mod tracer;
