@@ -323,7 +323,7 @@ fn hills() -> Mesh {
         let position = [
             637_000.25 + x,
             849_500.5 + y,
-            (height * 100.0).round() / 100.0 + 406.0,
+            ((height + 406.0) * 100.0).round() / 100.0,
         ];
         (position, normalize([-lean[0], -lean[1], 1.0]), is_roof)
     };

@@ -53,12 +53,15 @@ pub fn read(source: &Source, warnings: &mut Vec<Warning>) -> Result<Mesh, Refusa
         let problem = format!("the file ends after {there} of {} points", header.points);
         return Err(Fault::byte(bytes.len(), problem).into());
     }
+    let packed = match header.is_packed && header.points > 0 {
+        true => Some(packed::find(bytes, &header)?),
+        false => None,
+    };
     cloud::expect_points(header.points, row, source.limit())?;
     let records = Records::of(&header);
-    let parts = match header.is_packed {
-        true if header.points > 0 => packed::unpack(bytes, &header, &records)?,
-        true => Vec::new(),
-        false => plain(&bytes[header.data..], &header, &records),
+    let parts = match packed {
+        Some(packed) => packed.unpack(&records)?,
+        None => plain(&bytes[header.data..], &header, &records),
     };
     let all = Part::joined(parts, warnings);
     cloud::warn_of_ignored(&header.ignored(), warnings);

@@ -32,8 +32,17 @@ struct Chunk<'a> {
     points: u64,
 }
 
-/// Unpacks all points, in their order, on all threads.
-pub fn unpack(bytes: &[u8], header: &Header, records: &Records) -> Result<Vec<Part>, Fault> {
+/// The chunks of a file, which it is known to hold, and how they are packed.
+#[derive(Debug)]
+pub struct Packed<'a> {
+    chunks: Vec<Chunk<'a>>,
+    vlr: LazVlr,
+    is_layered: bool,
+}
+
+/// Finds the chunks. Errs with the byte where the record of LASzip or the table of chunks is damaged, or
+/// states other points than the header.
+pub fn find<'a>(bytes: &'a [u8], header: &Header) -> Result<Packed<'a>, Fault> {
     let at = header.records.0;
     let packing = header.packing(bytes)?;
     let unknown = |error: LasZipError| Fault::byte(at, format!("the record of LASzip: {error}"));
@@ -73,15 +82,27 @@ pub fn unpack(bytes: &[u8], header: &Header, records: &Records) -> Result<Vec<Pa
             return Err(Fault::byte(at, problem));
         }
     };
-    let parts: Vec<Result<Part, Fault>> = chunks
-        .par_iter()
-        .map(|chunk| match kind {
-            LAYERED => layered(chunk, &vlr, records),
-            _ => sequential(chunk, &vlr, records),
-        })
-        .collect();
-    // The fault that stands first in the file is the one reported.
-    parts.into_iter().collect()
+    Ok(Packed {
+        chunks,
+        vlr,
+        is_layered: kind == LAYERED,
+    })
+}
+
+impl Packed<'_> {
+    /// Unpacks all points, in their order, on all threads. Errs with the first chunk that is damaged.
+    pub fn unpack(&self, records: &Records) -> Result<Vec<Part>, Fault> {
+        let parts: Vec<Result<Part, Fault>> = self
+            .chunks
+            .par_iter()
+            .map(|chunk| match self.is_layered {
+                true => layered(chunk, &self.vlr, records),
+                false => sequential(chunk, &self.vlr, records),
+            })
+            .collect();
+        // The fault that stands first in the file is the one reported.
+        parts.into_iter().collect()
+    }
 }
 
 /// The chunks by their table, once it is known that the file holds them.

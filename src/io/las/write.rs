@@ -102,7 +102,8 @@ impl Axis {
             .fold((f64::INFINITY, f64::NEG_INFINITY), |(lo, hi), c| {
                 (lo.min(c), hi.max(c))
             });
-        let middle = (lo / 2.0 + hi / 2.0).round();
+        // Adding 0 takes the sign of a zero away.
+        let middle = (lo / 2.0 + hi / 2.0).round() + 0.0;
         let mut finest = None;
         for power in 0..=FINEST {
             // As the shortest decimal reads, and not a product of rounded factors.
