@@ -95,7 +95,7 @@ pub fn colors(stored: &[[u16; 3]], warnings: &mut Vec<Warning>) -> Option<Vec<[f
             return None;
         }
         0 => return None,
-        ..=255 => {
+        1..=255 => {
             warn(
                 "colours-of-bytes",
                 "colours of 16 bits of which 8 are used; read as bytes",
