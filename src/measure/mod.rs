@@ -9,8 +9,8 @@ pub mod passage;
 pub mod report_difference;
 mod sides;
 pub mod smooth_error;
-pub mod stability;
 pub mod splat_cover;
+pub mod stability;
 mod surface;
 #[cfg(test)]
 mod test_shapes;

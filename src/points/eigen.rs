@@ -108,7 +108,8 @@ mod tests {
         let second = normalize(cross(first, random()));
         let third = cross(first, second);
         let vectors = [first, second, third];
-        let entry = |i: usize, j: usize| (0..3).map(|k| values[k] * vectors[k][i] * vectors[k][j]);
+        let entry =
+            |i: usize, j: usize| (0..3).map(move |k| values[k] * vectors[k][i] * vectors[k][j]);
         let at = |i, j| entry(i, j).sum();
         let matrix = [at(0, 0), at(1, 1), at(2, 2), at(0, 1), at(0, 2), at(1, 2)];
         (matrix, first)
