@@ -7,6 +7,7 @@ use crate::job::Job;
 use crate::shared::{
     Common, Inputs, MaxError, Output, Preview, Seed, SkipBad, Verify, named, parsed,
 };
+use crate::table::short;
 use clap::value_parser;
 use scantle::error::{Result, number};
 use scantle::image::colour::CLAY;
@@ -227,7 +228,12 @@ fn splat_gen(job: &mut Job, params: &Params, args: &Args) -> Result<Found<Asked,
         Some(Form::Scantle) => job.write_splats(&splats)?,
         None => {}
     }
-    job.write_preview(|_| picture(&name, &cloud, &splats, &made));
+    // Laser scans of land stand upright in what surveyors call z.
+    let is_scan = job
+        .input()
+        .is_some_and(|input| ["las", "laz"].contains(&&*input.format));
+    let up = if is_scan { Up::Z } else { Up::Y };
+    job.write_preview(|_| picture(&name, up, &cloud, &splats, &made));
     let summary = format!(
         "{} discs for {} points, {} not covered, at most {} away",
         made.splats,
@@ -320,7 +326,13 @@ fn accuracy(made: &splat::Stats, coverage: &Coverage, holes: Option<&Holes>) -> 
     all
 }
 
-fn picture(name: &str, cloud: &Mesh, splats: &Splats, made: &splat::Stats) -> Result<Vec<u8>> {
+fn picture(
+    name: &str,
+    up: Up,
+    cloud: &Mesh,
+    splats: &Splats,
+    made: &splat::Stats,
+) -> Result<Vec<u8>> {
     let discs = io::splats::discs(splats, 12)?;
     let label = format!("{} points, {} discs", cloud.positions.len(), made.splats);
     let panels = [Panel {
@@ -328,12 +340,9 @@ fn picture(name: &str, cloud: &Mesh, splats: &Splats, made: &splat::Stats) -> Re
         what: What::Mesh(&discs),
         colour: CLAY,
     }];
-    let share = made.delta.diag.map_or(String::new(), |share| {
-        format!(" ({} % of the diagonal)", number(100.0 * share))
-    });
-    let caption = format!("{name}: within {}{share}", number(made.delta.abs));
+    let caption = format!("{name}: every point within {}", short(made.delta.abs));
     let params = preview::Params {
-        up: Up::Y,
+        up,
         ..preview::Params::DEFAULT
     };
     preview::side_by_side(&panels, &caption, "", &params)

@@ -13,14 +13,13 @@ use crate::spatial::local::LocalFrame;
 use rayon::prelude::*;
 use schemars::JsonSchema;
 use serde::Serialize;
-use std::sync::atomic::{AtomicU32, AtomicU64, Ordering::Relaxed};
 
 /// Points of the smallest box.
-const LEAF: usize = 16;
+const LEAF: usize = 8;
 /// Boxes of one level in one box of the next.
-const FAN: usize = 8;
-/// Discs of one parallel step.
-const CHUNK: usize = 512;
+const FAN: usize = 4;
+/// Points below which a box is searched by one thread.
+const PARALLEL: usize = 1 << 12;
 /// A rim or a height is met up to this share of the largest coordinate: the roundings of a centre.
 const ROUNDING: f64 = 64.0 * f64::EPSILON;
 /// Nearer to the silhouette than this cosine between normal and view nothing is judged.
@@ -83,51 +82,77 @@ impl Runs {
         }
     }
 
-    /// Calls `f` with each run of points whose box a disc may reach: where it begins, and its points.
-    fn about(&self, disc: &Disc, height: f64, f: &mut impl FnMut(usize, &[Vec3])) {
-        let reach = disc.normal.map(|n| {
-            disc.radius * (1.0 - n * n).max(0.0).sqrt() + height * n.abs() + disc.rounding
-        });
-        let bounds = Aabb {
-            lo: sub(disc.centre, reach),
-            hi: add(disc.centre, reach),
-        };
-        self.descend(self.levels.len() - 1, 0, &bounds, disc, height, f);
+    /// What covers each point best, in the order of the curve.
+    fn best(&self, discs: &[Disc]) -> Vec<Best> {
+        let mut best = vec![Best::NONE; self.points.len()];
+        let mut lists: Vec<u32> = (0..discs.len() as u32).collect();
+        let top = self.levels.len() - 1;
+        self.descend((top, 0), discs, 0, &mut lists, &mut best);
+        best
     }
 
+    /// Measures the points of a box against the discs that may reach it, which are among those of
+    /// `lists` from `from` on. What is added to the lists is taken off again.
     fn descend(
         &self,
-        level: usize,
-        node: usize,
-        bounds: &Aabb,
-        disc: &Disc,
-        height: f64,
-        f: &mut impl FnMut(usize, &[Vec3]),
+        (level, node): (usize, usize),
+        discs: &[Disc],
+        from: usize,
+        lists: &mut Vec<u32>,
+        best: &mut [Best],
     ) {
         let own = &self.levels[level][node];
-        let apart = (0..3).any(|a| own.lo[a] > bounds.hi[a] || own.hi[a] < bounds.lo[a]);
-        if apart {
-            return;
+        let start = lists.len();
+        lists.resize(2 * start - from, 0);
+        let (before, list) = lists.split_at_mut(start);
+        let mut count = 0;
+        for &i in &before[from..] {
+            list[count] = i;
+            count += usize::from(discs[i as usize].reaches(own));
         }
-        let (mut middle, mut extent) = (-dot(disc.normal, disc.centre), 0.0);
-        for a in 0..3 {
-            middle += 0.5 * disc.normal[a] * (own.lo[a] + own.hi[a]);
-            extent += 0.5 * disc.normal[a].abs() * (own.hi[a] - own.lo[a]);
-        }
-        if middle.abs() > extent + height + disc.rounding {
-            return;
-        }
+        lists.truncate(start + count);
         if level == 0 {
-            let start = node * LEAF;
-            let end = (start + LEAF).min(self.points.len());
-            f(start, &self.points[start..end]);
-            return;
+            let points = &self.points[node * LEAF..];
+            for &i in &lists[start..] {
+                discs[i as usize].measure(i, points, best);
+            }
+        } else if count > 0 {
+            let part = LEAF * FAN.pow(level as u32 - 1);
+            let child = |number| (level - 1, node * FAN + number);
+            if best.len() >= PARALLEL {
+                let list = &lists[start..];
+                best.par_chunks_mut(part)
+                    .enumerate()
+                    .for_each(|(number, best)| {
+                        self.descend(child(number), discs, 0, &mut list.to_vec(), best);
+                    });
+            } else {
+                for (number, best) in best.chunks_mut(part).enumerate() {
+                    self.descend(child(number), discs, start, lists, best);
+                }
+            }
         }
-        let end = ((node + 1) * FAN).min(self.levels[level - 1].len());
-        for child in node * FAN..end {
-            self.descend(level - 1, child, bounds, disc, height, f);
-        }
+        lists.truncate(start);
     }
+}
+
+/// The disc that covers a point best.
+#[derive(Debug, Clone, Copy)]
+struct Best {
+    /// How far it is; infinite where none does.
+    height: f64,
+    /// Its index; of equals the first.
+    disc: u32,
+    /// How many cover the point.
+    count: u32,
+}
+
+impl Best {
+    const NONE: Best = Best {
+        height: f64::INFINITY,
+        disc: u32::MAX,
+        count: 0,
+    };
 }
 
 /// The place of a point on a curve through cells of a thousandth of the frame; any would do.
@@ -147,7 +172,66 @@ struct Disc {
     centre: Vec3,
     normal: Vec3,
     radius: f64,
+    error: f64,
     rounding: f64,
+    /// Half the sides of the box around all that it may cover.
+    reach: Vec3,
+}
+
+impl Disc {
+    fn of(splat: &Splat, frame: &LocalFrame, unit: f64, rounding: f64) -> Self {
+        let (radius, error) = (splat.radius / unit, splat.error / unit);
+        let side = |n: f64| radius * (1.0 - n * n).max(0.0).sqrt() + error * n.abs();
+        Disc {
+            centre: frame.to_local(splat.centre),
+            normal: splat.normal,
+            radius,
+            error,
+            rounding,
+            reach: splat.normal.map(|n| side(n) + 2.0 * rounding),
+        }
+    }
+
+    /// Whether it may cover something in a box.
+    #[inline]
+    fn reaches(&self, bounds: &Aabb) -> bool {
+        let (mut middle, mut extent) = (0.0, self.error + 2.0 * self.rounding);
+        let mut near = true;
+        for a in 0..3 {
+            let offset = 0.5 * (bounds.lo[a] + bounds.hi[a]) - self.centre[a];
+            let half = 0.5 * (bounds.hi[a] - bounds.lo[a]);
+            near &= offset.abs() <= half + self.reach[a];
+            middle += self.normal[a] * offset;
+            extent += self.normal[a].abs() * half;
+        }
+        near && middle.abs() <= extent
+    }
+
+    /// Notes for each of the points whether it covers it.
+    #[inline]
+    fn measure(&self, index: u32, points: &[Vec3], best: &mut [Best]) {
+        let most = self.radius + self.rounding;
+        let high = self.error + self.rounding;
+        // What a difference of squares may lose is settled by the projection itself.
+        let square = most * most;
+        let lost = ROUNDING * (square + high * high);
+        for (p, best) in points.iter().zip(best) {
+            let d = sub(*p, self.centre);
+            let height = dot(d, self.normal);
+            let rest = dot(d, d) - height * height;
+            if height.abs() > high || rest > square + lost {
+                continue;
+            }
+            let along = || sub(d, scale(self.normal, height));
+            if rest <= square - lost || dot(along(), along()) <= square {
+                best.count += 1;
+                if height.abs() < best.height {
+                    best.height = height.abs();
+                    best.disc = index;
+                }
+            }
+        }
+    }
 }
 
 /// Measures every point of a cloud against all discs over it.
@@ -173,35 +257,14 @@ pub fn coverage(
     let corner = bounds.lo.iter().chain(&bounds.hi);
     let largest = corner.fold(0.0f64, |m, c| m.max((c / unit).abs())).max(1.0);
     let rounding = ROUNDING * largest;
-    let disc = |splat: &Splat| Disc {
-        centre: frame.to_local(splat.centre),
-        normal: splat.normal,
-        radius: splat.radius / unit,
-        rounding,
-    };
-    let best: Vec<AtomicU64> = (0..positions.len())
-        .into_par_iter()
-        .map(|_| AtomicU64::new(f64::INFINITY.to_bits()))
+    let discs: Vec<Disc> = splats
+        .par_iter()
+        .map(|splat| Disc::of(splat, &frame, unit, rounding))
         .collect();
-    let over: u64 = splats
-        .par_chunks(CHUNK)
-        .map(|chunk| {
-            let mut over = 0;
-            for splat in chunk {
-                each_covered(&runs, &disc(splat), splat.error / unit, |slot, height| {
-                    // Bits of numbers that are not negative are in the order of the numbers.
-                    best[slot].fetch_min(height.to_bits(), Relaxed);
-                    over += 1;
-                });
-            }
-            over
-        })
-        .sum();
-    let heights: Vec<f64> = best
-        .into_par_iter()
-        .map(|bits| f64::from_bits(bits.into_inner()))
-        .collect();
-    let angles = truth.map(|truth| angles(&runs, splats, &disc, unit, &heights, truth));
+    let best = runs.best(&discs);
+    let over: u64 = best.iter().map(|b| u64::from(b.count)).sum();
+    let angles = truth.map(|truth| angles(&runs, splats, (&discs, unit), &best, truth));
+    let heights = best.into_iter().map(|b| b.height).collect();
     let mut result = judge(&runs, splats, &frame, heights, bound / unit + rounding);
     result.discs_per_point = over as f64 / positions.len() as f64;
     result.max_distance = result.max_distance.map(|d| frame.length(d));
@@ -212,24 +275,6 @@ pub fn coverage(
         result.normal_max_deg = Some(angles.iter().fold(0.0, |m, a| a.max(m)));
     }
     result
-}
-
-/// Calls `f` with the slot of each point that a disc covers and its height.
-#[inline]
-fn each_covered(runs: &Runs, disc: &Disc, error: f64, mut f: impl FnMut(usize, f64)) {
-    let most = disc.radius + disc.rounding;
-    let high = error + disc.rounding;
-    runs.about(disc, error, &mut |start, points| {
-        for (slot, p) in (start..).zip(points) {
-            let d = sub(*p, disc.centre);
-            let height = dot(d, disc.normal).abs();
-            // Over the plane: the rest of the way, which a difference of squares would lose.
-            let along = sub(d, scale(disc.normal, dot(d, disc.normal)));
-            if height <= high && dot(along, along) <= most * most {
-                f(slot, height);
-            }
-        }
-    });
 }
 
 /// Counts what is covered; distances of what is not are those to the nearest disc.
@@ -310,38 +355,24 @@ impl Discs {
 }
 
 /// The angle in degrees at each covered point between its true normal and the field of the disc that
-/// covers it best, of equals the first.
+/// covers it best.
 fn angles(
     runs: &Runs,
     splats: &[Splat],
-    disc: &(impl Fn(&Splat) -> Disc + Sync),
-    unit: f64,
-    heights: &[f64],
+    (discs, unit): (&[Disc], f64),
+    best: &[Best],
     truth: &[Vec3],
 ) -> Vec<f64> {
-    let choice: Vec<AtomicU32> = heights.iter().map(|_| AtomicU32::new(u32::MAX)).collect();
-    splats
-        .par_iter()
-        .zip(0..splats.len() as u32)
-        .for_each(|(splat, i)| {
-            each_covered(runs, &disc(splat), splat.error / unit, |slot, height| {
-                if height == heights[slot] {
-                    choice[slot].fetch_min(i, Relaxed);
-                }
-            });
-        });
     let angle = |slot: usize| {
-        let splat = splats.get(choice[slot].load(Relaxed) as usize)?;
-        let d = scale(sub(runs.points[slot], disc(splat).centre), unit);
+        let disc = best[slot].disc as usize;
+        let splat = splats.get(disc)?;
+        let d = scale(sub(runs.points[slot], discs[disc].centre), unit);
         let found = splat.normal_at(dot(d, splat.tangent), dot(d, splat.bitangent()));
         let wanted = truth[runs.indices[slot] as usize];
         let angle = length(cross(found, wanted)).atan2(dot(found, wanted));
         Some(angle.to_degrees())
     };
-    (0..heights.len())
-        .into_par_iter()
-        .filter_map(angle)
-        .collect()
+    (0..best.len()).into_par_iter().filter_map(angle).collect()
 }
 
 /// A round piece of the surface that discs should cover.

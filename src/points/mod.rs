@@ -7,5 +7,7 @@ pub mod normals;
 pub mod order;
 pub mod orient;
 pub mod splat;
+#[cfg(test)]
+pub(crate) mod test_clouds;
 
 pub use splat::{Splat, Splats};

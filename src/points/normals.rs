@@ -199,3 +199,70 @@ pub(super) fn mirrored(points: &[Vec3], normals: &[Vec3], i: usize, j: usize) ->
         dot(a, b)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::numeric::vector::{cross, length};
+    use crate::points::test_clouds::{sphere, square};
+
+    fn planes_of(points: &[Vec3], count: usize) -> Vec<Plane> {
+        let tree = KdTree::build(points);
+        let near = Neighbourhoods::of(&tree, points, count);
+        planes(&tree, points, &near)
+    }
+
+    #[test]
+    fn normals_of_a_sphere_are_its_radii_and_spacings_its_density() {
+        let cloud = sphere(20_000, 1);
+        let found = planes_of(&cloud.positions, 16);
+        let off = |(plane, p): (&Plane, &Vec3)| length(cross(plane.normal, *p)).powi(2);
+        let pairs = found.iter().zip(&cloud.positions);
+        let rms = (pairs.map(off).sum::<f64>() / 20_000.0).sqrt().to_degrees();
+        assert!(rms < 0.5, "{rms}");
+        let area = found.iter().map(|p| p.spacing * p.spacing).sum::<f64>();
+        let share = area / (4.0 * std::f64::consts::PI);
+        assert!((share - 1.0).abs() < 0.2, "{share}");
+    }
+
+    #[test]
+    fn lines_take_more_neighbours_before_they_have_no_normal() {
+        // Scan lines far apart: sixteen neighbours are all of one line.
+        let scan: Vec<Vec3> = (0..2000)
+            .map(|i| [f64::from(i % 100) * 0.01, f64::from(i / 100) * 0.12, 0.0])
+            .collect();
+        let found = planes_of(&scan, 16);
+        for plane in &found {
+            assert!(plane.normal[2].abs() > 1.0 - 1e-12, "{plane:?}");
+            assert!(plane.spacing > 0.02, "{plane:?}");
+        }
+        let line: Vec<Vec3> = (0..200).map(|i| [0.0, f64::from(i), 0.0]).collect();
+        for plane in planes_of(&line, 16) {
+            assert_eq!(plane.normal, [0.0; 3]);
+        }
+    }
+
+    #[test]
+    fn few_points_have_few_neighbours() {
+        assert!(planes_of(&[], 16).is_empty());
+        assert_eq!(planes_of(&[[1.0; 3]], 16)[0].normal, [0.0; 3]);
+        let three = [[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
+        for plane in planes_of(&three, 16) {
+            assert!((plane.normal[2].abs() - 1.0).abs() < 1e-12);
+        }
+    }
+
+    #[test]
+    fn disagreement_counts_flips_and_not_edges() {
+        let mut cloud = square(2000);
+        let points = &cloud.positions;
+        let near = Neighbourhoods::of(&KdTree::build(points), points, 16);
+        let normals = cloud.normals.as_mut().expect("normals");
+        assert_eq!(disagreement(points, normals, &near), 0.0);
+        for normal in normals.iter_mut().step_by(2) {
+            normal[2] = -1.0;
+        }
+        let share = disagreement(points, normals, &near);
+        assert!((share - 0.5).abs() < 0.05, "{share}");
+    }
+}

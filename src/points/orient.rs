@@ -107,6 +107,9 @@ fn spanning(points: &[Vec3], normals: &[Vec3], near: &Neighbourhoods) -> Forest 
     }
     // The class of each slot's edge; none where the other end has it too, or has no normal.
     const NONE: u16 = u16::MAX;
+    // Whether the signs at its ends differ.
+    const DIFFER: u16 = 1 << 15;
+    let number = |class: u16| usize::from(class & !DIFFER);
     let mut classes = vec![NONE; near.indices.len()];
     classes
         .par_chunks_mut(k)
@@ -120,29 +123,29 @@ fn spanning(points: &[Vec3], normals: &[Vec3], near: &Neighbourhoods) -> Forest 
                 let j = j as usize;
                 let twice = j < i && near.row(j)[..k.min(EDGES)].contains(&(i as u32));
                 if !twice && normals[j] != [0.0; 3] {
-                    let weight = 1.0 - agreement(points, normals, i, j).abs();
-                    *class = (weight.clamp(0.0, 1.0) * (CLASSES - 1) as f64) as u16;
+                    let agreement = agreement(points, normals, i, j);
+                    let weight = (1.0 - agreement.abs()).clamp(0.0, 1.0);
+                    let sign = if agreement < 0.0 { DIFFER } else { 0 };
+                    *class = (weight * (CLASSES - 1) as f64) as u16 | sign;
                 }
             }
         });
     let mut starts = vec![0u32; CLASSES + 1];
     for class in classes.iter().filter(|c| **c != NONE) {
-        starts[usize::from(*class) + 1] += 1;
+        starts[number(*class) + 1] += 1;
     }
     for c in 0..CLASSES {
         starts[c + 1] += starts[c];
     }
     let mut slots = vec![0u32; starts[CLASSES] as usize];
     for (slot, class) in classes.iter().enumerate().filter(|(_, c)| **c != NONE) {
-        let place = &mut starts[usize::from(*class)];
+        let place = &mut starts[number(*class)];
         slots[*place as usize] = slot as u32;
         *place += 1;
     }
-    drop(classes);
     for slot in slots {
         let (i, j) = (slot / k as u32, near.indices[slot as usize]);
-        let differ = agreement(points, normals, i as usize, j as usize) < 0.0;
-        forest.join(i, j, differ);
+        forest.join(i, j, classes[slot as usize] & DIFFER != 0);
     }
     forest
 }
@@ -398,5 +401,77 @@ pub fn connected(normals: &[Vec3], near: &Neighbourhoods) -> Parts {
     Parts {
         count: (0..normals.len() as u32).filter(is_root).count() as u64,
         joined: 0,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mesh::Mesh;
+    use crate::points::normals::planes;
+    use crate::points::test_clouds::{both, shaken, slab, sphere, square};
+
+    /// Normals estimated and turned; the share that look the other way than the true ones.
+    fn wrong(cloud: &Mesh) -> (f64, Parts) {
+        let points = &cloud.positions;
+        let tree = KdTree::build(points);
+        let near = Neighbourhoods::of(&tree, points, 16);
+        let planes = planes(&tree, points, &near);
+        let mut normals: Vec<Vec3> = planes.iter().map(|p| p.normal).collect();
+        let parts = by_tree(&tree, points, &mut normals, &near);
+        assert_eq!(connected(&normals, &near).count, parts.count);
+        let truth = cloud.normals.as_ref().expect("normals");
+        let pairs = normals.iter().zip(truth);
+        let bad = pairs.filter(|(a, b)| dot(**a, **b) < 0.0).count();
+        (bad as f64 / points.len() as f64, parts)
+    }
+
+    #[test]
+    fn closed_surfaces_look_outwards() {
+        let ball = sphere(4000, 1);
+        assert_eq!(wrong(&ball).0, 0.0);
+        let two = both(&ball, &sphere(1000, 2), [5.0, 1.0, 0.0]);
+        let (share, parts) = wrong(&two);
+        assert_eq!((share, parts.count), (0.0, 2));
+        // Edges of 90 degrees, and noise.
+        let box_ = shaken(slab(8000, [1.0, 0.7, 0.4]), 0.004);
+        assert!(wrong(&box_).0 < 0.01, "{}", wrong(&box_).0);
+    }
+
+    #[test]
+    fn a_plate_thinner_than_the_spacing_of_two_points_keeps_its_sides() {
+        let plate = slab(20_000, [1.0, 1.0, 0.03]);
+        let (share, parts) = wrong(&plate);
+        assert_eq!(parts.count, 1);
+        assert!(share < 0.02, "{share}");
+    }
+
+    #[test]
+    fn a_sheet_looks_up_and_a_piece_beside_it_follows() {
+        let sheet = square(3000);
+        let piece = square(300);
+        let (share, parts) = wrong(&both(&sheet, &piece, [1.5, 0.0, 0.0]));
+        assert_eq!((share, parts.count), (0.0, 2));
+        // On its edge neither side is up: what is beside it tells.
+        let stand = |mesh: &Mesh| Mesh {
+            positions: mesh.positions.iter().map(|p| [p[2], p[0], p[1]]).collect(),
+            normals: Some(vec![[1.0, 0.0, 0.0]; mesh.positions.len()]),
+            ..Mesh::default()
+        };
+        let all = stand(&both(&sheet, &piece, [1.5, 0.0, 0.0]));
+        let (share, parts) = wrong(&all);
+        assert!(share == 0.0 || share == 1.0, "{share}");
+        assert_eq!(parts.count, 2);
+    }
+
+    #[test]
+    fn normals_turn_to_a_viewpoint_or_up() {
+        let points = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]];
+        let mut normals = vec![[0.0, 0.0, 1.0], [0.0, 0.0, -1.0]];
+        to_viewpoint(&points, &mut normals, [0.0, 0.0, -5.0]);
+        assert_eq!(normals, [[0.0, 0.0, -1.0]; 2]);
+        let mut normals = vec![[0.0, 0.0, -1.0], [0.0, -1.0, 0.0], [-1.0, 0.0, 0.0]];
+        upwards(&mut normals);
+        assert_eq!(normals, [[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [1.0, 0.0, 0.0]]);
     }
 }
