@@ -135,24 +135,32 @@ pub(super) struct Local {
 impl Local {
     /// The frame of a model with these bounds; errs where their extent overflows.
     pub fn around(bounds: Aabb) -> Result<Local> {
-        let longest = bounds.extent().into_iter().fold(0.0, f64::max);
+        Local::with_margin(bounds, 0.0)
+    }
+
+    /// The frame of points in a box, each with something this long around it; errs where that overflows.
+    ///
+    /// The margin moves no coordinate: where points are exact, so is the frame.
+    pub fn with_margin(points: Aabb, margin: f64) -> Result<Local> {
+        let longest = points.extent().into_iter().fold(0.0, f64::max) + 2.0 * margin;
         if !longest.is_finite() {
             return Err(Error::Geometry(Fault::whole(format!(
                 "the model spans {:?} to {:?}: its extent overflows",
-                bounds.lo, bounds.hi
+                points.lo, points.hi
             ))));
         }
-        let origin = if bounds.is_empty() {
-            [0.0; 3]
-        } else {
-            bounds.lo
-        };
-        let exponent = if longest > 0.0 {
-            exponent_above(longest)
-        } else {
-            0
-        };
-        Ok(Local { origin, exponent })
+        Ok(Local {
+            origin: if points.is_empty() {
+                [0.0; 3]
+            } else {
+                points.lo
+            },
+            exponent: if longest > 0.0 {
+                exponent_above(longest)
+            } else {
+                0
+            },
+        })
     }
 
     pub fn point(&self, p: Vec3) -> Vec3 {

@@ -63,8 +63,8 @@ impl Boxes {
 
     /// Leaves, and bytes of all.
     pub fn size(&self) -> (u64, u64) {
-        let lists =
-            size_of_val(self.leaves.as_slice()) as u64 + size_of_val(self.packets.as_slice()) as u64;
+        let lists = size_of_val(self.leaves.as_slice()) as u64
+            + size_of_val(self.packets.as_slice()) as u64;
         (self.leaves.len() as u64, self.tree.bytes() + lists)
     }
 
@@ -79,29 +79,30 @@ impl Boxes {
         mut visit: impl FnMut(Hit) -> ControlFlow<(), f64>,
     ) -> ControlFlow<()> {
         let mut far = limit;
-        self.tree.walk(&aim.slabs(), aim.limit(limit), |leaf, limit| {
-            let items = &self.leaves[leaf];
-            visits.leaves += 1;
-            visits.tests += items.iter().filter(|item| **item != NONE).count() as u64;
-            let (t, off, mut mask) = self.packets[leaf].meet(ray);
-            if mask == 0 {
-                return ControlFlow::Continue(limit);
-            }
-            let (t, off) = (t.to_array(), off.to_array());
-            while mask != 0 {
-                let lane = mask.trailing_zeros() as usize % LEAF;
-                mask &= mask - 1;
-                let hit = Hit {
-                    t: t[lane],
-                    off: off[lane],
-                    disc: items[lane],
-                };
-                if hit.t <= far {
-                    far = visit(hit)?;
+        self.tree
+            .walk(&aim.slabs(), aim.limit(limit), |leaf, limit| {
+                let items = &self.leaves[leaf];
+                visits.leaves += 1;
+                visits.tests += items.iter().filter(|item| **item != NONE).count() as u64;
+                let (t, off, mut mask) = self.packets[leaf].meet(ray);
+                if mask == 0 {
+                    return ControlFlow::Continue(limit);
                 }
-            }
-            ControlFlow::Continue(aim.limit(far))
-        })
+                let (t, off) = (t.to_array(), off.to_array());
+                while mask != 0 {
+                    let lane = mask.trailing_zeros() as usize % LEAF;
+                    mask &= mask - 1;
+                    let hit = Hit {
+                        t: t[lane],
+                        off: off[lane],
+                        disc: items[lane],
+                    };
+                    if hit.t <= far {
+                        far = visit(hit)?;
+                    }
+                }
+                ControlFlow::Continue(aim.limit(far))
+            })
     }
 }
 

@@ -41,9 +41,7 @@ impl Cover {
                 let bounds = |i: u32| discs.splats[i as usize].bounds();
                 Tree::Boxes(Boxes::new(&discs.plates, bounds))
             }
-            Accelerator::Octree => {
-                Tree::Octree(Box::new(Octree::new(&discs.splats, discs.bounds)))
-            }
+            Accelerator::Octree => Tree::Octree(Box::new(Octree::new(&discs.splats, discs.bounds))),
         };
         Cover { discs, tree }
     }
@@ -67,8 +65,7 @@ impl Cover {
         let own = own.filter(|from| from.ball == 0.0);
         let mut far = limit;
         tree.walk(&self.discs, &ray, limit, visits, |hit| {
-            let is_own =
-                own.is_some_and(|from| self.discs.is_own(&from, ray.direction, hit.disc));
+            let is_own = own.is_some_and(|from| self.discs.is_own(&from, &ray, hit.disc));
             if !is_own {
                 far = visit(hit)?;
             }
@@ -152,7 +149,10 @@ impl Cover {
         self.see_by(&Tree::Each, 0, ray, far, blend, &mut hits, &mut visits)
     }
 
-    #[expect(clippy::too_many_arguments, reason = "one caller names a tree, the other does not")]
+    #[expect(
+        clippy::too_many_arguments,
+        reason = "one caller names a tree, the other does not"
+    )]
     fn see_by(
         &self,
         tree: &Tree,
@@ -166,7 +166,9 @@ impl Cover {
         self.around(tree, object, ray, limit, hits, visits)?;
         let nearer = |a: &Hit, b: &Hit| a.off.total_cmp(&b.off).then(a.disc.cmp(&b.disc));
         let chosen = *hits.iter().min_by(|a, b| nearer(a, b))?;
-        let errors = hits.iter().map(|hit| self.discs.splats[hit.disc as usize].error);
+        let errors = hits
+            .iter()
+            .map(|hit| self.discs.splats[hit.disc as usize].error);
         let alone = Seen {
             t: chosen.t,
             disc: chosen.disc,

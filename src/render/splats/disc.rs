@@ -98,7 +98,8 @@ pub(super) struct Discs {
 
 /// Errs where a disc is none: a number that is not finite, a radius below 0, a normal of no length.
 pub(super) fn check(splats: &Splats) -> Result<()> {
-    let wrong = |i: usize, problem: String| Err(Error::Geometry(Fault::element("splat", i, problem)));
+    let wrong =
+        |i: usize, problem: String| Err(Error::Geometry(Fault::element("splat", i, problem)));
     for (i, s) in splats.splats.iter().enumerate() {
         let vectors = [s.centre, s.normal, s.tangent, s.field].concat();
         let others = [s.radius, s.error, s.slopes[0], s.slopes[1]];
@@ -142,26 +143,29 @@ impl Discs {
     /// Whether a ray that started on a disc leaves out a hit on another, or the same.
     ///
     /// Discs that overlap stand for one piece of surface, of which each is a little above the other
-    /// in places: what the ray meets of them is left out where the two agree, and where it would come
-    /// from below a surface that it has just left. A ray that starts under the surface leaves out all
-    /// that it meets from below.
+    /// in places: what the ray meets of them is left out where the two agree, where the start is as
+    /// near to the other as both are off, and where the ray would come from below a surface that it
+    /// has just left. A ray that starts under the surface leaves out all that it meets from below.
     #[inline]
-    pub fn is_own(&self, from: &Origin, direction: Vec3, disc: u32) -> bool {
+    pub fn is_own(&self, from: &Origin, ray: &Ray, disc: u32) -> bool {
         if disc == from.item {
             return true;
         }
-        let (a, b) = (&self.splats[from.item as usize], &self.splats[disc as usize]);
-        let from_below = dot(b.normal, direction) * from.side > 0.0;
+        let (a, b) = (
+            &self.splats[from.item as usize],
+            &self.splats[disc as usize],
+        );
+        let from_below = dot(b.normal, ray.direction) * from.side > 0.0;
         if from.under && from_below {
             return true;
         }
-        let agrees = dot(a.normal, b.normal) > AGREES;
-        if !agrees && !from_below {
-            return false;
-        }
+        let off = a.error + b.error;
         let apart = sub(a.centre, b.centre);
-        let reach = a.radius + b.radius + a.error + b.error;
+        let reach = a.radius + b.radius + off;
         dot(apart, apart) <= reach * reach
+            && (from_below
+                || dot(a.normal, b.normal) > AGREES
+                || dot(b.normal, sub(ray.origin, b.centre)).abs() <= off)
     }
 }
 

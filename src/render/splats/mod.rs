@@ -96,11 +96,7 @@ pub struct Look {
 /// Errs for parameters out of range, for discs that are none, for a scene without anything to draw or
 /// whose extent overflows. Cost: O(n log n) for the tree, then for each pixel a ray, and for each hit
 /// one to each light and up to two more until `depth` bounces are done.
-pub fn draw(
-    scene: &Scene,
-    params: &Params,
-    progress: &dyn Progress,
-) -> Result<(Drawing, Stats)> {
+pub fn draw(scene: &Scene, params: &Params, progress: &dyn Progress) -> Result<(Drawing, Stats)> {
     let stage = Stage::new(scene, params, progress)?;
     progress.stage("trace", u64::from(params.size[1]));
     let (light, tally) = picture::draw(&stage, params, progress);
@@ -115,10 +111,13 @@ pub fn draw(
     } else {
         Vec::new()
     };
-    let surface = stage.reference.as_ref().and_then(|object| match &object.shape {
-        Shape::Mesh(triangles) => Some(triangles.mesh().clone()),
-        _ => None,
-    });
+    let surface = stage
+        .reference
+        .as_ref()
+        .and_then(|object| match &object.shape {
+            Shape::Mesh(triangles) => Some(triangles.mesh().clone()),
+            _ => None,
+        });
     let diagonal = stage.bounds.diagonal();
     let exact = if surface.is_some() {
         progress.stage("reference", u64::from(params.size[1]));
@@ -160,7 +159,9 @@ fn checked(stage: &Stage, params: &Params) -> Checked {
         };
         let discs = cover.discs.plates.len() as u64;
         let pixels = u64::from(params.size[0]) * u64::from(params.size[1]);
-        let most = (CHECK_TESTS / discs.max(1)).clamp(64, CHECK_RAYS).min(pixels);
+        let most = (CHECK_TESTS / discs.max(1))
+            .clamp(64, CHECK_RAYS)
+            .min(pixels);
         let eye = Eye::new(stage, params);
         let counts: Vec<Checked> = (0..most)
             .into_par_iter()

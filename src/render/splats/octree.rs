@@ -99,11 +99,7 @@ impl Octree {
     }
 
     /// The octree with other corners in its test of a disc against a cell.
-    pub(super) fn with_corners(
-        splats: &[Splat],
-        bounds: Aabb,
-        corners: [[f64; 2]; 4],
-    ) -> Octree {
+    pub(super) fn with_corners(splats: &[Splat], bounds: Aabb, corners: [[f64; 2]; 4]) -> Octree {
         let side = bounds.extent().into_iter().fold(0.0, f64::max);
         let centre = if bounds.is_empty() {
             [0.0; 3]
@@ -145,9 +141,7 @@ impl Octree {
             },
             ray,
             inverse: std::array::from_fn(|a| 1.0 / steep(a)),
-            first: (0..3).fold(0, |m, a| {
-                m | usize::from(ray.direction[a] < 0.0) << a
-            }),
+            first: (0..3).fold(0, |m, a| m | usize::from(ray.direction[a] < 0.0) << a),
             far: limit,
             visits,
             visit,

@@ -110,6 +110,39 @@ impl Material {
         index: 1.5,
     };
 
+    /// Lacquer: a bright highlight and a faint mirror.
+    pub const GLOSS: Material = Material {
+        specular: 0.5,
+        shininess: 80.0,
+        mirror: 0.1,
+        ..Material::DEFAULT
+    };
+
+    /// Polished metal.
+    pub const MIRROR: Material = Material {
+        specular: 0.5,
+        shininess: 200.0,
+        mirror: 0.9,
+        ..Material::DEFAULT
+    };
+
+    /// Crystal.
+    pub const GLASS: Material = Material {
+        specular: 0.6,
+        shininess: 200.0,
+        mirror: 0.1,
+        transparent: 0.9,
+        ..Material::DEFAULT
+    };
+
+    /// Materials by name.
+    pub const NAMED: [(&'static str, Material); 4] = [
+        ("clay", Material::DEFAULT),
+        ("gloss", Material::GLOSS),
+        ("mirror", Material::MIRROR),
+        ("glass", Material::GLASS),
+    ];
+
     /// The names of all but the colour.
     pub const NUMBERS: [&'static str; 7] = [
         "ambient",

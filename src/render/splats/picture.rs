@@ -118,4 +118,3 @@ impl<'a> Eye<'a> {
         rows.into_iter().flatten().collect()
     }
 }
-

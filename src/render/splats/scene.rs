@@ -117,13 +117,6 @@ impl Sphere {
         }
         Ok(())
     }
-
-    fn bounds(&self) -> Aabb {
-        Aabb {
-            lo: self.centre.map(|c| c - self.radius),
-            hi: self.centre.map(|c| c + self.radius),
-        }
-    }
 }
 
 impl Scene {
@@ -153,15 +146,22 @@ impl Scene {
         Ok(())
     }
 
-    /// The box around all that is drawn; around the reference too, so that it fits in the frame.
-    fn bounds(&self) -> Aabb {
-        let covers = self.covers.iter().map(Splats::bounds);
+    /// The frame of all that is drawn, and of the reference; errs where there is nothing.
+    ///
+    /// It is that of points alone: what stands around them rounds differently at another place.
+    pub(super) fn local(&self) -> Result<Local> {
+        let discs = || self.covers.iter().flat_map(|cover| &cover.splats);
         let meshes = self.meshes.iter().chain(&self.reference).map(used_bounds);
-        let spheres = self.spheres.iter().map(Sphere::bounds);
-        covers
-            .chain(meshes)
-            .chain(spheres)
-            .fold(Aabb::EMPTY, Aabb::union)
+        let centres = discs().map(|s| &s.centre);
+        let centres = centres.chain(self.spheres.iter().map(|s| &s.centre));
+        let points = meshes.fold(Aabb::around(centres), Aabb::union);
+        if points.is_empty() {
+            let problem = "has nothing to draw: no discs, no triangles and no spheres";
+            return Err(Error::Geometry(Fault::whole(problem)));
+        }
+        let radii = discs().map(|s| s.radius);
+        let radii = radii.chain(self.spheres.iter().map(|s| s.radius));
+        Local::with_margin(points, radii.fold(0.0, f64::max))
     }
 }
 
@@ -209,17 +209,8 @@ impl Stage {
     pub fn new(scene: &Scene, params: &Params, progress: &dyn Progress) -> Result<Stage> {
         params.check()?;
         scene.check()?;
-        let bounds = scene.bounds();
-        if bounds.is_empty() {
-            let problem = "has nothing to draw: no discs, no triangles and no spheres";
-            return Err(Error::Geometry(Fault::whole(problem)));
-        }
         progress.stage("layout", 0);
-        let local = Local::around(bounds)?;
-        let bounds = Aabb {
-            lo: local.point(bounds.lo),
-            hi: local.point(bounds.hi),
-        };
+        let local = scene.local()?;
         let shapes = shapes(scene, params, &local);
         let objects = shapes.into_iter().enumerate();
         let objects: Vec<Object> = objects
@@ -229,33 +220,32 @@ impl Stage {
             let shape = Shape::Mesh(Box::new(Triangles::new(mesh, &local)));
             Object::new(shape, scene.material(0))
         });
+        let all = objects.iter().chain(&reference);
+        let bounds = all.fold(Aabb::EMPTY, |all, object| all.union(object.bounds()));
         let up = normalize(params.camera.map_or([0.0, 1.0, 0.0], |view| view.up));
         let direction = params
             .camera
             .map_or(THREE_QUARTER, |view| sub(view.eye, view.target));
         let framing = Camera::framing(&bounds, direction, up, 1.0);
-        let lights = placed_lights(params, &local, &framing, bounds, up)?;
+        let (lights, places) = placed_lights(params, &local, &framing, bounds, up)?;
         let points = outline(&objects);
         let plane =
             (params.ground != Ground::None).then(|| Plane::new(&points, bounds, up, params));
-        let places: Vec<Vec3> = lights.iter().map(|light| local.point(light.place)).collect();
         let camera = match params.camera {
             Some(view) => view.camera(&local)?,
             None => framed(&framing, points, plane.as_ref(), &places, params.size),
         };
-        let mut stage = Stage {
+        Ok(Stage {
             local,
             objects,
-            bounds,
+            bounds: widened(bounds),
             lamps: lamps(&lights, &places),
             lights,
             camera,
             up,
             plane,
             reference,
-        };
-        stage.bounds = widened(stage.bounds);
-        Ok(stage)
+        })
     }
 
     /// What a ray sees first of some objects.
@@ -322,25 +312,29 @@ fn shapes(scene: &Scene, params: &Params, local: &Local) -> Vec<Shape> {
     covers.chain(meshes).chain(spheres).collect()
 }
 
-/// The lights, that of the default in the file's unit too.
+/// The lights in the file's unit, and where they are in the frame.
 fn placed_lights(
     params: &Params,
     local: &Local,
     framing: &Camera,
     bounds: Aabb,
     up: Vec3,
-) -> Result<Vec<Light>> {
-    if let Some(far) = (params.lights.iter()).find(|light| !is_near(local.point(light.place))) {
-        return Err(far.too_far());
+) -> Result<(Vec<Light>, Vec<Vec3>)> {
+    let places = params.lights.iter().map(|light| local.point(light.place));
+    let places: Vec<Vec3> = places.collect();
+    if let Some(far) = places.iter().position(|place| !is_near(*place)) {
+        return Err(params.lights[far].too_far());
     }
-    if !params.lights.is_empty() {
-        return Ok(params.lights.clone());
+    if !places.is_empty() {
+        return Ok((params.lights.clone(), places));
     }
     let way = scale(upper_left(framing, up), 4.0 * framing.unit);
-    Ok(vec![Light {
-        place: local.point_back(add(bounds.centre(), way)),
+    let place = add(bounds.centre(), way);
+    let light = Light {
+        place: local.point_back(place),
         colour: [255; 3],
-    }])
+    };
+    Ok((vec![light], vec![place]))
 }
 
 /// The lamps: all together give at most as much of any of red, green and blue as one white lamp.
@@ -383,8 +377,7 @@ fn outline(objects: &[Object]) -> Vec<Vec3> {
 /// Points of a sphere.
 fn around(centre: Vec3, radius: f64) -> impl Iterator<Item = Vec3> {
     let step = |i: i32| f64::from(i - 2);
-    let directions =
-        (0..125).map(move |i| normalize([step(i % 5), step(i / 5 % 5), step(i / 25)]));
+    let directions = (0..125).map(move |i| normalize([step(i % 5), step(i / 5 % 5), step(i / 25)]));
     directions.map(move |d| add(centre, scale(d, radius)))
 }
 
@@ -401,7 +394,9 @@ fn framed(
         for light in lights {
             for i in 0..count {
                 let ray = (points[i], sub(points[i], *light));
-                let cast = plane.under(ray.0, ray.1).map(|way| add(ray.0, scale(ray.1, way)));
+                let cast = plane
+                    .under(ray.0, ray.1)
+                    .map(|way| add(ray.0, scale(ray.1, way)));
                 points.extend(cast.filter(|place| plane.nearness(*place) == 1.0));
             }
         }
@@ -470,6 +465,18 @@ impl Object {
         }
     }
 
+    /// The box around it.
+    fn bounds(&self) -> Aabb {
+        match &self.shape {
+            Shape::Cover(cover) => cover.discs.bounds,
+            Shape::Mesh(triangles) => used_bounds(&triangles.mesh),
+            Shape::Sphere(centre, radius) => Aabb {
+                lo: centre.map(|c| c - radius),
+                hi: centre.map(|c| c + radius),
+            },
+        }
+    }
+
     /// Whether a ray meets it before `reach`.
     fn blocks(&self, at: usize, ray: &Ray, reach: f64, visits: &mut Visits) -> bool {
         match &self.shape {
@@ -492,7 +499,11 @@ impl Triangles {
         tracer::Ray {
             origin: ray.origin,
             direction: ray.direction,
-            reach: [ray.least.max(own.map_or(ray.least, |from| from.ball.max(LIFT))), reach],
+            reach: [
+                ray.least
+                    .max(own.map_or(ray.least, |from| from.ball.max(LIFT))),
+                reach,
+            ],
         }
     }
 
@@ -504,16 +515,25 @@ impl Triangles {
         let corners = self.mesh.triangles[hit.triangle as usize];
         let normal = self.mesh.normals.as_ref().map_or(plane, |normals| {
             let parts = corners.iter().zip(weights);
-            let sum = parts.fold([0.0; 3], |sum, (v, w)| add(sum, scale(normals[*v as usize], w)));
+            let sum = parts.fold([0.0; 3], |sum, (v, w)| {
+                add(sum, scale(normals[*v as usize], w))
+            });
             let normal = normalize(sum);
-            if dot(normal, plane) > 0.0 { normal } else { plane }
+            if dot(normal, plane) > 0.0 {
+                normal
+            } else {
+                plane
+            }
         });
         let mut sight = object.plain(at, hit.t, hit.triangle, normal, plane);
         if let Some(colours) = self.mesh.colors.as_ref().filter(|_| object.takes_colours()) {
             let parts = corners.iter().zip(weights);
             sight.colour = parts.fold([0.0; 3], |sum, (v, w)| {
                 let [r, g, b, _] = colours[*v as usize];
-                add(sum, scale([r, g, b].map(|c| f64::from(disc::to_light(c))), w))
+                add(
+                    sum,
+                    scale([r, g, b].map(|c| f64::from(disc::to_light(c))), w),
+                )
             });
         }
         Some(sight)

@@ -218,9 +218,15 @@ impl<'a> Follower<'a> {
             if passes == 0.0 {
                 continue;
             }
-            facing = add(facing, scale(lamp.light, passes * material.diffuse * cosine));
+            facing = add(
+                facing,
+                scale(lamp.light, passes * material.diffuse * cosine),
+            );
             let shine = dot(mirrored, to).max(0.0).powf(material.shininess);
-            highlight = add(highlight, scale(lamp.light, passes * material.specular * shine));
+            highlight = add(
+                highlight,
+                scale(lamp.light, passes * material.specular * shine),
+            );
         }
         let own = std::array::from_fn(|c| sight.colour[c] * facing[c]);
         [own, highlight]
