@@ -517,21 +517,19 @@ impl Encoder<'_> {
         );
         let motion = motion.expect("what was just written is read");
         let mut encoder = corrections::Encoder::new(window.vertices, bound);
-        let mut frame = vec![[0.0; 3]; window.vertices];
-        let mut given = frame.clone();
+        let mut given = vec![[0.0; 3]; window.vertices];
         told.squared_error = 0.0;
-        for f in 0..window.frames() {
-            motion.frame(f, &mut frame);
+        motion.each_frame(window.vertices, 0..window.frames(), |f, frame| {
             for (v, given) in given.iter_mut().enumerate() {
                 *given = std::array::from_fn(|axis| window.at(f, v, axis));
             }
-            encoder.frame(&mut frame, &given);
+            encoder.frame(frame, &given);
             let apart = frame
                 .iter()
                 .zip(&given)
                 .map(|(p, q)| (0..3).map(|i| (p[i] - q[i]) * (p[i] - q[i])).sum::<f64>());
             told.squared_error += apart.sum::<f64>();
-        }
+        });
         told.corrected = encoder.count;
         told.bits.corrections = encoder.spent();
         told.corrections = (encoder.count > 0).then(|| encoder.finish());

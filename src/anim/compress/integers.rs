@@ -43,12 +43,14 @@ impl<const N: usize> Integers<N> {
         }
     }
 
+    #[inline]
     fn odds(&self, context: &Context<N>, decision: usize) -> [i32; N] {
         let said = std::array::from_fn(|i| self.said[i][context.cells[i]][decision]);
         Mixture::odds(&said)
     }
 
     /// Whether the number goes on beyond a decision.
+    #[inline]
     fn decide(
         &mut self,
         coder: &mut impl Coder,

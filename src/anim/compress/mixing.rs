@@ -21,6 +21,7 @@ const LOGISTIC: [i32; 33] = [
 ];
 
 /// The probability of these log odds, in 2^16.
+#[inline]
 fn squash(odds: i32) -> i32 {
     let at = odds.clamp(-LARGEST, LARGEST) + 8 * NAT;
     let (step, rest) = ((at / (NAT / 2)) as usize, at % (NAT / 2));
@@ -60,6 +61,7 @@ impl Stretch {
 static STRETCH: Stretch = Stretch::TABLE;
 
 /// The log odds of a probability in 2^16.
+#[inline]
 fn stretch(p: i32) -> i32 {
     i32::from(STRETCH.0[(p >> 4) as usize])
 }
@@ -80,18 +82,42 @@ impl Adaptive {
     };
 
     /// The probability of a one, in 2^16.
+    #[inline]
     pub fn one(self) -> u32 {
         i32::from(self.one).clamp(MARGIN, WHOLE - MARGIN) as u32
     }
 
-    /// Meets a bit; after `limit` of them each counts as much as the one before.
+    /// Meets a bit; after `limit` of them, [`LONGEST`] at most, each counts as much as the one before.
+    #[inline]
     pub fn meet(&mut self, bit: bool, limit: u16) {
-        let (one, met) = (i32::from(self.one), i32::from(self.met));
-        let aim = if bit { WHOLE - 1 } else { 0 };
-        self.one = (one + (aim - one) * 2 / (2 * met + 3)) as u16;
+        debug_assert!(limit <= LONGEST);
+        let share = SHARES[usize::from(self.met)];
+        let one = u64::from(self.one);
+        // Towards what was met by two parts of 2 n + 3, rounded down.
+        let moved = |apart: u64| ((apart * share) >> 32) as u16;
+        if bit {
+            self.one += moved(2 * ((1 << 16) - 1 - one));
+        } else {
+            self.one -= moved(2 * one);
+        }
         self.met = (self.met + 1).min(limit);
     }
 }
+
+/// Bits met before a probability forgets, at most.
+const LONGEST: u16 = 255;
+
+/// What a number below 2^17 is multiplied with, to be divided by `2 n + 3` once 32 bits are dropped;
+/// exact, as 2^17 times the excess over 2^32 stays below 2^32.
+const SHARES: [u64; LONGEST as usize + 1] = {
+    let mut shares = [0; LONGEST as usize + 1];
+    let mut n = 0;
+    while n < shares.len() {
+        shares[n] = (1u64 << 32).div_ceil(2 * n as u64 + 3);
+        n += 1;
+    }
+    shares
+};
 
 /// What `N` contexts say about one decision, and how much each is believed.
 #[derive(Debug, Clone)]
@@ -114,11 +140,13 @@ impl<const N: usize> Mixture<N> {
     }
 
     /// The log odds that the contexts name.
+    #[inline]
     pub fn odds(said: &[Adaptive; N]) -> [i32; N] {
         std::array::from_fn(|i| stretch(said[i].one() as i32))
     }
 
     /// The probability of a one by one set of weights, in 2^16.
+    #[inline]
     pub fn one(&self, set: usize, odds: &[i32; N]) -> u32 {
         let weights = self.weights[set].iter().zip(odds);
         let sum: i64 = weights.map(|(w, o)| i64::from(*w) * i64::from(*o)).sum();
@@ -126,6 +154,7 @@ impl<const N: usize> Mixture<N> {
     }
 
     /// Meets the bit that had the probability `one`.
+    #[inline]
     pub fn meet(&mut self, set: usize, odds: &[i32; N], one: u32, bit: bool) {
         let aim = if bit { WHOLE - 1 } else { 0 };
         let missed = i64::from(aim) - i64::from(one);
@@ -166,10 +195,19 @@ mod tests {
     }
 
     #[test]
+    fn shares_are_those_of_a_division() {
+        for n in 0..=u64::from(LONGEST) {
+            for apart in (0..1 << 17).step_by(7).chain([(1 << 17) - 2]) {
+                assert_eq!((apart * SHARES[n as usize]) >> 32, apart / (2 * n + 3));
+            }
+        }
+    }
+
+    #[test]
     fn a_probability_learns_its_source() {
         let mut p = Adaptive::NEW;
         for i in 0..10_000 {
-            p.meet(i % 10 == 0, 250);
+            p.meet(i % 10 == 0, LONGEST);
         }
         assert!(
             (f64::from(p.one()) / 65_536.0 - 0.1).abs() < 0.02,
@@ -183,8 +221,8 @@ mod tests {
         let mut mixture = Mixture::<2>::new(1);
         let (mut right, mut wrong) = (Adaptive::NEW, Adaptive::NEW);
         for _ in 0..50 {
-            right.meet(true, 250);
-            wrong.meet(false, 250);
+            right.meet(true, LONGEST);
+            wrong.meet(false, LONGEST);
         }
         let odds = Mixture::odds(&[right, wrong]);
         for _ in 0..1000 {

@@ -146,10 +146,34 @@ struct Places<'a> {
 struct Room {
     /// Places less their centre, in units of their spread; the last is that of the vertex itself.
     local: Vec<f64>,
-    /// The lower half of the covariances, row by row, and then of their root.
+    /// The same, coordinate by coordinate.
+    turned: Vec<f64>,
     matrix: Vec<f64>,
-    /// What is solved for: the covariances with the vertex, and ones.
-    sides: [Vec<f64>; 2],
+    /// The last row of the covariances: with the vertex itself.
+    with: Vec<f64>,
+    ones: Vec<f64>,
+    sums: Vec<f64>,
+}
+
+impl Room {
+    /// The sum over all coordinates of the products of place `i` with the first places, into `sums`.
+    ///
+    /// Here as in [`root`] and [`solve`], what lies side by side are sums that do not wait for one
+    /// another; each of them goes on in the order of its terms.
+    fn products(&mut self, i: usize, stride: usize) {
+        self.sums.fill(0.0);
+        for coordinate in self.turned.chunks_exact(stride) {
+            add_scaled(&mut self.sums, coordinate, coordinate[i]);
+        }
+    }
+}
+
+/// `sums += values * factor`.
+#[inline]
+fn add_scaled(sums: &mut [f64], values: &[f64], factor: f64) {
+    for (sum, x) in sums.iter_mut().zip(values) {
+        *sum += factor * x;
+    }
 }
 
 fn dot(a: &[f64], b: &[f64]) -> f64 {
@@ -180,6 +204,13 @@ impl Places<'_> {
         let around = &local[..ring.len() * dims];
         let scale = (ring.len() as f64 / dot(around, around)).sqrt();
         local.iter_mut().for_each(|x| *x *= scale);
+        let stride = ring.len() + 1;
+        room.turned.resize(stride * dims, 0.0);
+        for (i, place) in local.chunks_exact(dims).enumerate() {
+            for (d, x) in place.iter().enumerate() {
+                room.turned[d * stride + i] = *x;
+            }
+        }
         scale.is_finite()
     }
 
@@ -192,79 +223,83 @@ impl Places<'_> {
 
     /// The weights of one ring.
     fn krige(&self, ring: &[u32], rank: usize, room: &mut Room, weights: &mut [f64]) {
-        let (count, dims) = (ring.len(), self.dims);
+        let count = ring.len();
         if count < 2 || !self.localise(ring, rank, room) {
             weights.fill(1.0 / count as f64);
             return;
         }
-        let Room {
-            local,
-            matrix,
-            sides,
-        } = room;
-        let place = |i: usize| &local[i * dims..(i + 1) * dims];
+        let stride = count + 1;
         let mut lengths = [0.0; MOST_RING + 1];
-        for (i, length) in lengths[..=count].iter_mut().enumerate() {
-            *length = dot(place(i), place(i));
-        }
-        matrix.clear();
-        for i in 0..count {
-            for j in 0..i {
-                let product = dot(place(i), place(j));
-                matrix.push(self.covariance(lengths[i], lengths[j], product));
+        let lengths = &mut lengths[..stride];
+        for coordinate in room.turned.chunks_exact(stride) {
+            for (length, x) in lengths.iter_mut().zip(coordinate) {
+                *length += x * x;
             }
-            matrix.push(self.covariance(lengths[i], lengths[i], lengths[i]) + NOISE);
         }
-        let [with, ones] = sides;
-        with.clear();
-        with.extend((0..count).map(|i| {
-            let product = dot(place(i), place(count));
-            self.covariance(lengths[i], lengths[count], product)
-        }));
-        ones.clear();
-        ones.resize(count, 1.0);
-        root(matrix, count);
-        solve(matrix, with);
-        solve(matrix, ones);
+        room.sums.resize(stride, 0.0);
+        room.matrix.resize(count * count, 0.0);
+        for j in 0..count {
+            room.products(j, stride);
+            let column = &mut room.matrix[j * count..(j + 1) * count];
+            let below = column.iter_mut().zip(&room.sums).enumerate().skip(j);
+            for (i, (to, product)) in below {
+                *to = self.covariance(lengths[i], lengths[j], *product);
+            }
+            column[j] += NOISE;
+        }
+        room.products(count, stride);
+        let with = room.sums.iter().zip(lengths.iter()).take(count);
+        let with = with.map(|(product, length)| self.covariance(*length, lengths[count], *product));
+        room.with.clear();
+        room.with.extend(with);
+        room.ones.clear();
+        room.ones.resize(count, 1.0);
+        let sums = &mut room.sums[..count];
+        root(&mut room.matrix, sums);
+        solve(&room.matrix, &mut room.with, sums);
+        solve(&room.matrix, &mut room.ones, sums);
+        let (with, ones) = (&room.with, &room.ones);
         let share = (1.0 - with.iter().sum::<f64>()) / ones.iter().sum::<f64>();
-        for (weight, (with, one)) in weights.iter_mut().zip(with.iter().zip(ones.iter())) {
+        for (weight, (with, one)) in weights.iter_mut().zip(with.iter().zip(ones)) {
             *weight = with + share * one;
         }
     }
 }
 
-/// Where row `i` of the lower half of a matrix begins.
-const fn row(i: usize) -> usize {
-    i * (i + 1) / 2
-}
-
-/// The root of a positive definite matrix, in its place (Cholesky).
-fn root(matrix: &mut [f64], count: usize) {
-    for i in 0..count {
-        let (above, below) = matrix.split_at_mut(row(i));
-        let this = &mut below[..=i];
-        for j in 0..i {
-            let other = &above[row(j)..=row(j) + j];
-            this[j] = (this[j] - dot(&this[..j], &other[..j])) / other[j];
+/// The root of a positive definite matrix, in its place (Cholesky): column after column, of which the
+/// part from the diagonal on counts. `sums` is room for one column.
+fn root(matrix: &mut [f64], sums: &mut [f64]) {
+    let count = sums.len();
+    for j in 0..count {
+        let (before, this) = matrix.split_at_mut(j * count);
+        let this = &mut this[j..count];
+        let sums = &mut sums[j..];
+        sums.fill(0.0);
+        for column in before.chunks_exact(count) {
+            add_scaled(sums, &column[j..], column[j]);
         }
-        let (known, last) = this.split_at_mut(i);
         // Below this there is nothing but rounding: the noise alone is larger.
-        last[0] = (last[0] - dot(known, known)).max(0.5 * NOISE).sqrt();
+        let diagonal = (this[0] - sums[0]).max(0.5 * NOISE).sqrt();
+        this[0] = diagonal;
+        for (x, sum) in this.iter_mut().zip(sums.iter()).skip(1) {
+            *x = (*x - sum) / diagonal;
+        }
     }
 }
 
-/// Solves for one right side, given the root.
-fn solve(root: &[f64], side: &mut [f64]) {
-    for i in 0..side.len() {
-        let this = &root[row(i)..=row(i) + i];
-        side[i] = (side[i] - dot(&this[..i], &side[..i])) / this[i];
+/// Solves for one right side, given the root; `sums` is room for one column.
+fn solve(root: &[f64], side: &mut [f64], sums: &mut [f64]) {
+    let count = side.len();
+    sums.fill(0.0);
+    for (k, column) in root.chunks_exact(count).enumerate() {
+        side[k] = (side[k] - sums[k]) / column[k];
+        add_scaled(&mut sums[k + 1..], &column[k + 1..], side[k]);
     }
-    for i in (0..side.len()).rev() {
-        let this = &root[row(i)..=row(i) + i];
-        side[i] /= this[i];
+    for i in (0..count).rev() {
+        side[i] /= root[i * count + i];
         let value = side[i];
-        for (side, x) in side[..i].iter_mut().zip(this) {
-            *side -= value * x;
+        for (k, side) in side[..i].iter_mut().enumerate() {
+            *side -= value * root[k * count + i];
         }
     }
 }

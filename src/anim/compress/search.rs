@@ -63,29 +63,21 @@ const NARROWEST: f64 = 0.003;
 /// The best trial there is, and how many were made; the best of all misses the target where none
 /// reaches it.
 ///
-/// `first` is a step to begin with and `range` what steps may be. Two trials run at a time at first.
-pub fn search<T: Send>(
+/// `first` is a step to begin with and `range` what steps may be. Trials run one after the other, for
+/// each takes all the memory there is need of.
+pub fn search<T>(
     wanted: Wanted,
     first: f64,
     range: [f64; 2],
-    trial: impl Fn(f64) -> Trial<T> + Sync,
+    trial: impl Fn(f64) -> Trial<T>,
 ) -> (Trial<T>, u64) {
-    let [least, most] = range;
-    let clamp = |step: f64| step.clamp(least, most);
-    let first = clamp(first);
-    let second = clamp(if first < most {
-        1.25 * first
-    } else {
-        first / 1.25
-    });
-    let (a, b) = rayon::join(|| trial(first), || trial(second));
-    let mut all = vec![a, b];
+    let mut all = vec![trial(first.clamp(range[0], range[1]))];
     let target = wanted.target();
     // A little below the target, so that it is not passed by a hair.
     let aim = target * (1.0 + 2.0 * wanted.near()) / 3.0;
     let fits = |trial: &Trial<T>| wanted.of(trial) <= target;
-    let mut count = 2;
-    for _ in 2..ROUNDS {
+    let mut count = 1;
+    for _ in 1..ROUNDS {
         let near = |trial: &&Trial<T>| fits(trial) && wanted.of(trial) >= wanted.near() * target;
         if all.iter().any(|trial| near(&trial)) {
             break;
@@ -107,7 +99,7 @@ pub fn search<T: Send>(
         };
         if better { other } else { best }
     });
-    (best.expect("two trials were made"), count)
+    (best.expect("a trial was made"), count)
 }
 
 /// The next step to try: by a power law between the two trials that the aim lies between, or away

@@ -3,6 +3,7 @@
 use crate::numeric::vector::Vec3;
 use nalgebra::{DMatrix, SymmetricEigen};
 use rayon::prelude::*;
+use std::ops::Range;
 
 /// Vertices that are looked at together.
 const BLOCK: usize = 128;
@@ -88,30 +89,23 @@ impl Trajectories<'_> {
         sums
     }
 
-    /// The products of each vertex's trajectory less its mean with vectors of `3 F` numbers: for each
-    /// vector a value for every vertex.
-    pub fn onto(&self, vectors: &[f64], means: &[Vec3]) -> Vec<Vec<f64>> {
+    /// The products of each vertex's trajectory less its mean with vectors of `3 F` numbers.
+    pub fn onto(&self, vectors: &[f64], means: &[Vec3]) -> Products {
         let size = 3 * self.frames();
-        let of = |block: &mut Vec<f64>, first: usize| {
-            self.block(first * BLOCK, means, block);
-            let vectors = vectors.chunks_exact(size);
-            let product = |vector: &[f64]| {
-                let mut sums = [0.0; BLOCK];
+        let count = vectors.len() / size;
+        let mut blocks = vec![[0.0; BLOCK]; self.vertices.div_ceil(BLOCK) * count];
+        let each = blocks.par_chunks_mut(count.max(1)).enumerate();
+        each.for_each_init(Vec::new, |block, (number, sums)| {
+            self.block(number * BLOCK, means, block);
+            for (vector, sums) in vectors.chunks_exact(size).zip(sums) {
                 for (value, row) in vector.iter().zip(block.as_chunks::<BLOCK>().0) {
                     for (sum, x) in sums.iter_mut().zip(row) {
                         *sum += value * x;
                     }
                 }
-                sums
-            };
-            vectors.map(product).collect::<Vec<_>>()
-        };
-        let blocks = (0..self.vertices.div_ceil(BLOCK)).into_par_iter();
-        let blocks: Vec<_> = blocks.map_init(Vec::new, of).collect();
-        let value = |q: usize, v: usize| blocks[v / BLOCK][q][v % BLOCK];
-        (0..vectors.len() / size)
-            .map(|q| (0..self.vertices).map(|v| value(q, v)).collect())
-            .collect()
+            }
+        });
+        Products { count, blocks }
     }
 
     /// The squared lengths of all trajectories less their means, summed.
@@ -127,6 +121,21 @@ impl Trajectories<'_> {
             })
             .collect();
         rows.iter().sum()
+    }
+}
+
+/// A value for every vertex, of each of several vectors.
+#[derive(Debug, Default)]
+pub struct Products {
+    count: usize,
+    blocks: Vec<[f64; BLOCK]>,
+}
+
+impl Products {
+    /// The value of a vertex for one of the vectors.
+    #[inline]
+    pub fn at(&self, vector: usize, vertex: usize) -> f64 {
+        self.blocks[vertex / BLOCK * self.count + vector][vertex % BLOCK]
     }
 }
 
@@ -241,10 +250,16 @@ impl Cosines {
 
     /// From frequencies to frames.
     pub fn inverse(&self, frequencies: &[f64], out: &mut [f64]) {
+        self.inverse_at(frequencies, 0..self.frames, out);
+    }
+
+    /// From frequencies to some of the frames.
+    pub fn inverse_at(&self, frequencies: &[f64], frames: Range<usize>, out: &mut [f64]) {
         out.fill(0.0);
         for (k, x) in frequencies.iter().enumerate() {
             if *x != 0.0 {
-                for (out, c) in out.iter_mut().zip(self.frequency(k)) {
+                let there = &self.frequency(k)[frames.clone()];
+                for (out, c) in out.iter_mut().zip(there) {
                     *out += x * c;
                 }
             }
@@ -306,7 +321,7 @@ mod tests {
             cosines.inverse(there, time);
         }
         let onto = trajectories.onto(&time, &means);
-        let held: f64 = onto.iter().flatten().map(|x| x * x).sum();
+        let held: f64 = onto.blocks.iter().flatten().map(|x| x * x).sum();
         assert!((held / total - 1.0).abs() < 1e-10);
     }
 }

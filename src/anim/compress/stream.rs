@@ -104,6 +104,9 @@ impl Header {
     }
 }
 
+/// Positions that are made together.
+const TOGETHER: usize = 1 << 18;
+
 /// The motion of a window.
 #[derive(Debug)]
 pub enum Motion {
@@ -137,12 +140,33 @@ impl Motion {
         })
     }
 
-    /// A frame of the window in local coordinates, before corrections.
-    pub fn frame(&self, frame: usize, out: &mut [Vec3]) {
-        match self {
-            Motion::Trajectory(components, cosines) => components.frame(cosines, frame, out),
-            Motion::Local(clusters) => clusters.frame(frame, out),
-            Motion::Delta(frames) => out.copy_from_slice(&frames[frame]),
+    /// Hands over frames of the window, one after the other, in local coordinates, before corrections.
+    ///
+    /// Several are made together where that is faster, as many as [`TOGETHER`] positions hold.
+    pub fn each_frame(
+        &self,
+        vertices: usize,
+        frames: Range<usize>,
+        mut take: impl FnMut(usize, &mut [Vec3]),
+    ) {
+        let most = match self {
+            Motion::Trajectory(..) => (TOGETHER / vertices.max(1)).clamp(1, 16),
+            _ => 1,
+        };
+        let mut out = vec![[0.0; 3]; vertices * most.min(frames.len())];
+        for first in frames.clone().step_by(most) {
+            let frames = first..frames.end.min(first + most);
+            let out = &mut out[..vertices * frames.len()];
+            match self {
+                Motion::Trajectory(components, cosines) => {
+                    components.frames(cosines, frames.clone(), out);
+                }
+                Motion::Local(clusters) => clusters.frame(first, out),
+                Motion::Delta(frames) => out.copy_from_slice(&frames[first]),
+            }
+            for (f, out) in frames.zip(out.chunks_exact_mut(vertices.max(1))) {
+                take(f, out);
+            }
         }
     }
 }
@@ -425,27 +449,29 @@ impl<'a> Stream<'a> {
         range: Range<usize>,
         mut take: impl FnMut(usize, &[Vec3]),
     ) -> Result<(), Fault> {
-        let mut frame = vec![[0.0; 3]; self.header.vertices];
+        let vertices = self.header.vertices;
         let (unit, origin) = (self.header.unit(), self.header.origin);
         for window in &self.windows {
             let corrections = window.corrections;
-            let corrections = corrections.map(|c| corrections::Decoder::new(frame.len(), c));
+            let corrections = corrections.map(|c| corrections::Decoder::new(vertices, c));
             let mut corrections = corrections.transpose()?;
-            for f in window.frames.clone() {
-                if f >= range.end || f < range.start && corrections.is_none() {
-                    continue;
-                }
-                window.motion.frame(f - window.frames.start, &mut frame);
+            let before = window.frames.start;
+            let first = match corrections {
+                Some(_) => 0,
+                None => range.start.saturating_sub(before),
+            };
+            let last = range.end.min(window.frames.end).saturating_sub(before);
+            window.motion.each_frame(vertices, first..last, |f, frame| {
                 if let Some(corrections) = &mut corrections {
-                    corrections.frame(&mut frame);
+                    corrections.frame(frame);
                 }
-                if f >= range.start {
-                    for p in &mut frame {
+                if before + f >= range.start {
+                    for p in frame.iter_mut() {
                         *p = std::array::from_fn(|i| p[i] * unit + origin[i]);
                     }
-                    take(f, &frame);
+                    take(before + f, frame);
                 }
-            }
+            });
         }
         Ok(())
     }

@@ -16,10 +16,11 @@ use super::field::{self, Fields, Wanted};
 use super::hierarchy::Hierarchy;
 use super::integers::{CLASSES, Context, Integers, class_of};
 use super::prediction::Weights;
-use super::spectrum::{Cosines, Spectrum, Trajectories, spectrum};
+use super::spectrum::{Cosines, Products, Spectrum, Trajectories, spectrum};
 use crate::error::Fault;
 use crate::numeric::vector::Vec3;
 use rayon::prelude::*;
+use std::ops::Range;
 
 /// Squared steps that a bit outweighs: near the slope of distortion over rate, less what rounding
 /// down costs in what is foreseen from it.
@@ -37,7 +38,7 @@ const PART: usize = 3000;
 /// Components of a window at most.
 const MOST: usize = 4096;
 /// Directions that trajectories are multiplied with at a time.
-const TOGETHER: usize = 32;
+const TOGETHER: usize = 16;
 
 /// What is known of a window before a step is chosen.
 #[derive(Debug)]
@@ -418,7 +419,7 @@ impl<'a> Analysis<'a> {
         // Of each component the bits of its direction and of its weights, and the error it takes away.
         let mut each: Vec<[f64; 3]> = Vec::new();
         let mut failed: Option<(usize, Part)> = None;
-        let mut onto = Vec::new();
+        let mut onto = Products::default();
         for (q, direction) in directions.iter().enumerate() {
             if q % TOGETHER == 0 {
                 let some = &directions[q..directions.len().min(q + TOGETHER)];
@@ -431,7 +432,7 @@ impl<'a> Analysis<'a> {
             state.directions.code(coder, given, Some(&numbers[q]));
             let basis = coder.spent() - start;
             let length = length(direction);
-            let values = self.left(&onto[q % TOGETHER], &held, &directions, q);
+            let values = self.left(&onto, &held, &directions, q);
             let field = state.weights(coder, length, Some(&values));
             let bits = coder.spent() - start;
             let gain = values.iter().zip(&field);
@@ -465,8 +466,8 @@ impl<'a> Analysis<'a> {
         }
     }
 
-    /// The products of all trajectories with some directions: for each a value for every vertex.
-    fn onto(&self, directions: &[Vec<f64>]) -> Vec<Vec<f64>> {
+    /// The products of all trajectories with some directions.
+    fn onto(&self, directions: &[Vec<f64>]) -> Products {
         let frames = self.frames();
         let mut time = vec![0.0; directions.len() * 3 * frames];
         let axes = time.par_chunks_mut(frames).enumerate();
@@ -478,11 +479,18 @@ impl<'a> Analysis<'a> {
     }
 
     /// The weights of direction `q` that take up what the components before leave, by rank; `onto` are
-    /// the products of the trajectories with it.
-    fn left(&self, onto: &[f64], held: &[Vec<f32>], directions: &[Vec<f64>], q: usize) -> Vec<f64> {
+    /// the products of the trajectories with it and those beside it.
+    fn left(
+        &self,
+        onto: &Products,
+        held: &[Vec<f32>],
+        directions: &[Vec<f64>],
+        q: usize,
+    ) -> Vec<f64> {
         let this = &directions[q];
         let vertices = self.hierarchy.vertices.iter();
-        let mut values: Vec<f64> = vertices.map(|v| onto[*v as usize]).collect();
+        let value = |v: &u32| onto.at(q % TOGETHER, *v as usize);
+        let mut values: Vec<f64> = vertices.map(value).collect();
         for (field, direction) in held.iter().zip(directions) {
             // Directions are nearly at right angles, so single precision does for the rest.
             let common = direction.iter().zip(this);
@@ -582,41 +590,50 @@ pub fn decode(
 }
 
 impl Components {
-    /// Positions at one frame of the window, in local coordinates.
+    /// Positions at some frames of the window, one frame after the other, in local coordinates.
     ///
-    /// Cost: three products for each vertex and component.
-    pub fn frame(&self, cosines: &Cosines, frame: usize, out: &mut [Vec3]) {
-        let frames = cosines.frames();
-        let motions: Vec<Vec3> = self
-            .directions
-            .iter()
-            .map(|direction| {
-                std::array::from_fn(|axis| {
-                    let there = &direction[axis * frames..(axis + 1) * frames];
-                    let at = |(k, x): (usize, &f64)| x * cosines.frequency(k)[frame];
-                    there.iter().enumerate().map(at).sum()
-                })
-            })
-            .collect();
-        for (block, out) in out.chunks_mut(LANES).enumerate() {
-            let first = block * LANES;
-            let mut sums = [[0.0; LANES]; 3];
-            for (i, mean) in self.means[first..first + out.len()].iter().enumerate() {
-                for axis in 0..3 {
-                    sums[axis][i] = mean[axis];
+    /// Cost: three products for each vertex, component and frame; weights are read once.
+    pub fn frames(&self, cosines: &Cosines, frames: Range<usize>, out: &mut [Vec3]) {
+        let (count, vertices) = (self.directions.len(), self.means.len());
+        let mut motions = vec![[0.0; 3]; frames.len() * count];
+        let mut time = vec![0.0; frames.len()];
+        for (q, direction) in self.directions.iter().enumerate() {
+            for (axis, numbers) in direction.chunks_exact(cosines.frames()).enumerate() {
+                cosines.inverse_at(numbers, frames.clone(), &mut time);
+                for (f, time) in time.iter().enumerate() {
+                    motions[f * count + q][axis] = *time;
                 }
-            }
-            let weights = &self.weights[block * motions.len()..(block + 1) * motions.len()];
-            for (motion, weights) in motions.iter().zip(weights) {
-                for axis in 0..3 {
-                    for i in 0..LANES {
-                        sums[axis][i] += motion[axis] * weights[i];
-                    }
-                }
-            }
-            for (i, out) in out.iter_mut().enumerate() {
-                *out = std::array::from_fn(|axis| sums[axis][i]);
             }
         }
+        for first in (0..vertices).step_by(LANES) {
+            let means = &self.means[first..vertices.min(first + LANES)];
+            let weights = &self.weights[first / LANES * count..][..count];
+            for f in 0..frames.len() {
+                let motions = &motions[f * count..(f + 1) * count];
+                let out = &mut out[f * vertices + first..][..means.len()];
+                block(means, motions, weights, out);
+            }
+        }
+    }
+}
+
+/// Positions of [`LANES`] vertices at most.
+#[inline]
+fn block(means: &[Vec3], motions: &[Vec3], weights: &[[f64; LANES]], out: &mut [Vec3]) {
+    let mut sums = [[0.0; LANES]; 3];
+    for (i, mean) in means.iter().enumerate() {
+        for axis in 0..3 {
+            sums[axis][i] = mean[axis];
+        }
+    }
+    for (motion, weights) in motions.iter().zip(weights) {
+        for axis in 0..3 {
+            for i in 0..LANES {
+                sums[axis][i] += motion[axis] * weights[i];
+            }
+        }
+    }
+    for (i, out) in out.iter_mut().enumerate() {
+        *out = std::array::from_fn(|axis| sums[axis][i]);
     }
 }
