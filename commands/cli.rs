@@ -5,7 +5,7 @@ use crate::streams::say;
 use crate::trade::{Declared, TABLE};
 use crate::{
     compare, completions, compress_anim, convert, formats, info, isosurface, man, schema, shadow,
-    smooth_mc, stability, tradeoff, tunnels, voxelize,
+    smooth_mc, splat_gen, stability, tradeoff, tunnels, voxelize,
 };
 use clap::error::ErrorKind;
 use clap::{Arg, CommandFactory, FromArgMatches, Parser, Subcommand};
@@ -31,6 +31,7 @@ pub enum Command {
     SmoothMc(Box<smooth_mc::Args>),
     Isosurface(isosurface::Args),
     Tunnels(Box<tunnels::Args>),
+    SplatGen(Box<splat_gen::Args>),
     CompressAnim(compress_anim::Args),
     Info(info::Args),
     Compare(compare::Args),
@@ -48,6 +49,7 @@ const GROUPS: &[(&str, &[&str])] = &[
     ("Mesh to volume", &["voxelize"]),
     ("Mesh to picture", &["shadow"]),
     ("Volume to mesh", &["smooth-mc", "isosurface"]),
+    ("Points", &["splat-gen"]),
     ("Molecules", &["tunnels"]),
     ("Animations", &["compress-anim"]),
     ("Any file", &["info", "convert", "compare"]),

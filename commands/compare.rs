@@ -119,6 +119,7 @@ pub fn run(args: &Args) -> Result<Exit> {
             Content::Animation(a) => animations(job, &a, args),
             Content::Report(a) => reports(job, &a, args),
             Content::Molecule(_) => Err(no_measure(job, Kind::Molecule)),
+            Content::Splats(_) => Err(no_measure(job, Kind::Splats)),
         };
         Ok(found?.check("tolerance", args.tolerance))
     })

@@ -3,7 +3,7 @@
 use crate::context::{Context, Files};
 use crate::exit::Exit;
 use crate::job::{Found, Job};
-use crate::shared::{Common, Inputs, Output};
+use crate::shared::{Common, Inputs, Output, SkipBad};
 use crate::words;
 use scantle::error::{Error, Fault, Result};
 use scantle::io;
@@ -11,10 +11,11 @@ use scantle::io::format::{Format, Kind};
 use schemars::JsonSchema;
 use serde::Serialize;
 
-/// Write a mesh, a volume, an image, a molecule or an animation in another format
+/// Write a mesh, a cloud, splats, a volume, an image, a molecule or an animation in another format
 ///
 /// Vertices, faces, voxels, pixels, atoms, frames and their order stay as they are. What the output format cannot
-/// hold is left out, and a warning counts it.
+/// hold is left out, and a warning counts it. Splats are written as polygons where the output format is
+/// one of meshes.
 #[derive(Debug, clap::Args)]
 #[command(after_long_help = EXAMPLES)]
 pub struct Args {
@@ -22,6 +23,11 @@ pub struct Args {
     inputs: Inputs,
     #[command(flatten)]
     output: Output,
+    #[command(flatten)]
+    skip_bad: SkipBad,
+    /// Sides of the polygons that splats are written as, in a format of meshes
+    #[arg(long, value_name = "N", default_value_t = SIDES, value_parser = clap::value_parser!(u16).range(3..=1024))]
+    sides: u16,
     #[command(flatten)]
     common: Common,
 }
@@ -32,9 +38,17 @@ Examples:
   scantle convert fixtures/shapes/*.obj -o {stem}.stl
 ";
 
+/// Sides of a polygon that stands for a disc: it lacks at most 3.5 % of the radius.
+const SIDES: u16 = 12;
+
 /// What was asked for.
 #[derive(Debug, Serialize, JsonSchema)]
 pub struct Params {
+    /// Whether points that have a number which is not finite are left out of clouds.
+    skip_bad: bool,
+    /// Sides of the polygons that splats are written as, in a format of meshes; null for other results.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    sides: Option<u16>,
     /// The format that was written.
     output_format: Option<&'static str>,
 }
@@ -42,7 +56,7 @@ pub struct Params {
 /// What was done.
 #[derive(Debug, Serialize, JsonSchema)]
 pub struct Stats {
-    /// What was converted: `mesh`, `volume`, `image`, `molecule` or `animation`.
+    /// What was converted: `mesh`, `splats`, `volume`, `image`, `molecule` or `animation`.
     kind: &'static str,
 }
 
@@ -53,17 +67,28 @@ pub type Report = scantle::report::Report<Params, Stats>;
 pub fn run(args: &Args) -> Result<Exit> {
     let context = Context::new(&args.common)?;
     let files = Files::each(&args.inputs).output(&args.output);
-    context.run("convert", &files, convert)
+    context.run("convert", &files, |job| convert(job, args))
 }
 
-fn convert(job: &mut Job) -> Result<Found<Params, Stats>> {
+fn convert(job: &mut Job, args: &Args) -> Result<Found<Params, Stats>> {
+    let skip_bad = args.skip_bad.skip_bad;
+    job.skip_bad(skip_bad);
     let content = job.read()?;
     let kind = content.kind();
-    if kind != Kind::Report {
-        job.expect_output(&[kind])?;
+    match kind {
+        Kind::Report => {}
+        Kind::Splats => job.expect_output(&[Kind::Splats, Kind::Mesh])?,
+        kind => job.expect_output(&[kind])?,
     }
+    let written = job.output_format_for(kind);
+    let is_polygons =
+        kind == Kind::Splats && written.is_some_and(|format| format.kind() == Kind::Mesh);
     match &content {
         io::Content::Mesh(mesh) => job.write_mesh(mesh)?,
+        io::Content::Splats(splats) if is_polygons => {
+            job.write_mesh(&io::splats::discs(splats, usize::from(args.sides))?)?;
+        }
+        io::Content::Splats(splats) => job.write_splats(splats)?,
         io::Content::Volume(volume) => job.write_volume(volume)?,
         io::Content::Image(image) => job.write_image(image)?,
         io::Content::Molecule(molecule) => job.write_molecule(molecule)?,
@@ -75,7 +100,9 @@ fn convert(job: &mut Job) -> Result<Found<Params, Stats>> {
         }
     }
     let params = Params {
-        output_format: job.output_format().map(Format::name),
+        skip_bad,
+        sides: is_polygons.then_some(args.sides),
+        output_format: written.map(Format::name),
     };
     let summary = job
         .input()

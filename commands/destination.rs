@@ -2,7 +2,7 @@
 
 use crate::taken::Writes;
 use scantle::error::{Error, Result};
-use scantle::io::format::Format;
+use scantle::io::format::{Format, Kind};
 use scantle::io::sink::Sink;
 use std::collections::BTreeMap;
 use std::fs;
@@ -123,6 +123,16 @@ impl Target {
             option: "output",
             sink: &self.place.sink,
             format: Some(self.format),
+        }
+    }
+
+    /// The format that a result of a kind is written in: where the name of the file tells it, formats of
+    /// several kinds may share the extension.
+    pub fn format_for(&self, kind: Kind) -> Format {
+        if self.is_named {
+            self.format
+        } else {
+            self.format.holding(kind)
         }
     }
 

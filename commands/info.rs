@@ -3,12 +3,14 @@
 use crate::context::{Context, Files};
 use crate::exit::Exit;
 use crate::job::{Found, Job};
-use crate::shared::{Common, Inputs};
+use crate::shared::{Common, Inputs, SkipBad};
 use crate::words;
 use scantle::anim::motion::{Motion, motion};
 use scantle::error::{Result, number};
 use scantle::io::Content;
+use scantle::mesh::cloud::{CloudInventory, inventory as inventory_of_cloud};
 use scantle::mesh::topology::{Topology, topology};
+use scantle::points::Splats;
 use scantle::protein::inventory::{Inventory, inventory};
 use scantle::report::{Made, made_by};
 use scantle::volume::Volume;
@@ -18,6 +20,7 @@ use serde::Serialize;
 /// Tell what is in a file, and what looks wrong with it
 ///
 /// Counts, bounds and, of a mesh, its topology: whether it is closed, oriented and manifold. Of a
+/// cloud, what its points carry, and which are duplicates; of splats, their radii and errors. Of a
 /// volume, where it is, what is set and the range of values; of an image, its size and samples; of a
 /// molecule, its chains, residues and elements; of an animation, its frames and what of it moves. Of JSON, the documents, and which commands they are
 /// reports of.
@@ -26,6 +29,8 @@ use serde::Serialize;
 pub struct Args {
     #[command(flatten)]
     inputs: Inputs,
+    #[command(flatten)]
+    skip_bad: SkipBad,
     #[command(flatten)]
     common: Common,
 }
@@ -39,9 +44,12 @@ Examples:
 /// Commands, versions and kinds of residues that are named to a person.
 const NAMED: usize = 4;
 
-/// This command has no parameters.
+/// What was asked for.
 #[derive(Debug, Serialize, JsonSchema)]
-pub struct Params {}
+pub struct Params {
+    /// Whether points that have a number which is not finite are left out of clouds.
+    skip_bad: bool,
+}
 
 /// What is in the file.
 #[derive(Debug, Serialize, JsonSchema)]
@@ -49,6 +57,10 @@ pub struct Params {}
 pub enum Stats {
     /// Triangles, polylines, points.
     Mesh(Box<Topology>),
+    /// Points alone.
+    Cloud(Box<CloudInventory>),
+    /// Discs with a field of normals.
+    Splats(Box<SplatStats>),
     /// Voxels.
     Volume(VolumeStats),
     /// Pixels.
@@ -80,6 +92,25 @@ pub struct VolumeStats {
     max: Option<f64>,
 }
 
+/// What is in a set of splats.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct SplatStats {
+    /// Splats.
+    splats: u64,
+    /// Smallest, median (the lower of two) and largest radius, in the file's unit.
+    radius: [Option<f64>; 3],
+    /// The largest height of a point above or below its splat, in the file's unit.
+    max_error: f64,
+    /// Points that all splats cover, each counted once for every splat that does.
+    covered: u64,
+    /// Whether splats have colours.
+    colours: bool,
+    /// Whether splats have classes.
+    classes: bool,
+    /// Bytes that they take in memory.
+    bytes: u64,
+}
+
 /// What is in an image.
 #[derive(Debug, Serialize, JsonSchema)]
 pub struct ImageStats {
@@ -108,16 +139,37 @@ pub type Report = scantle::report::Report<Params, Stats>;
 /// Looks into each input.
 pub fn run(args: &Args) -> Result<Exit> {
     let context = Context::new(&args.common)?;
-    context.run("info", &Files::each(&args.inputs), look)
+    let params = || Params {
+        skip_bad: args.skip_bad.skip_bad,
+    };
+    context.run("info", &Files::each(&args.inputs), |job| {
+        look(job, params())
+    })
 }
 
-fn look(job: &mut Job) -> Result<Found<Params, Stats>> {
+fn look(job: &mut Job, params: Params) -> Result<Found<Params, Stats>> {
+    job.skip_bad(params.skip_bad);
     let content = job.read()?;
     let mut summary = job
         .input()
         .map(|input| words::content(&input.content))
         .unwrap_or_default();
     let stats = match content {
+        Content::Mesh(mesh) if mesh.is_cloud() => {
+            job.progress().stage("count", 0);
+            let inventory = inventory_of_cloud(&mesh)?;
+            job.warn(inventory.warnings());
+            summary += &carried_in_words(&inventory);
+            Stats::Cloud(Box::new(inventory))
+        }
+        Content::Splats(splats) => {
+            job.progress().stage("count", 0);
+            let stats = splat_stats(&splats);
+            if let [Some(min), _, Some(max)] = stats.radius {
+                summary += &format!(", of radius {} to {}", number(min), number(max));
+            }
+            Stats::Splats(Box::new(stats))
+        }
         Content::Mesh(mesh) => {
             let topology = topology(&mesh, job.progress())?;
             job.warn(topology.warnings());
@@ -163,7 +215,7 @@ fn look(job: &mut Job) -> Result<Found<Params, Stats>> {
             })
         }
     };
-    Ok(Found::new(Params {}, stats, summary))
+    Ok(Found::new(params, stats, summary))
 }
 
 /// `, 2 reports of info by scantle 0.1.0`, for the first few.
@@ -194,6 +246,39 @@ fn chains_in_words(inventory: &Inventory) -> String {
         text += &format!(", and {} more kinds", inventory.hetero.len() - NAMED);
     }
     text
+}
+
+/// `, normals, 3 classes`.
+fn carried_in_words(inventory: &CloudInventory) -> String {
+    let parts = [
+        (", normals", inventory.normals),
+        (", colours", inventory.colours),
+    ];
+    let parts = parts.into_iter().filter(|(_, has)| *has);
+    let mut text: String = parts.map(|(what, _)| what).collect();
+    if !inventory.classes.is_empty() {
+        let classes = inventory.classes.len() as u64;
+        text += &format!(", {}", words::counted(classes, "class", "classes"));
+    }
+    text
+}
+
+fn splat_stats(splats: &Splats) -> SplatStats {
+    let all = &splats.splats;
+    let mut radii: Vec<f64> = all.iter().map(|splat| splat.radius).collect();
+    radii.sort_unstable_by(f64::total_cmp);
+    let middle = radii.get(radii.len().saturating_sub(1) / 2);
+    SplatStats {
+        splats: all.len() as u64,
+        radius: [radii.first(), middle, radii.last()].map(Option::<&f64>::copied),
+        max_error: all
+            .iter()
+            .fold(0.0, |most: f64, splat| most.max(splat.error)),
+        covered: all.iter().map(|splat| u64::from(splat.count)).sum(),
+        colours: splats.colors.is_some(),
+        classes: splats.classes.is_some(),
+        bytes: std::mem::size_of_val(all.as_slice()) as u64,
+    }
 }
 
 fn volume_stats(volume: &Volume) -> VolumeStats {

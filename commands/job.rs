@@ -17,6 +17,7 @@ use scantle::io::sink::Sink;
 use scantle::io::source::Source;
 use scantle::io::{self, Content};
 use scantle::mesh::Mesh;
+use scantle::points::Splats;
 use scantle::progress::Progress;
 use scantle::protein::Molecule;
 use scantle::report::{Input, Output, Report, Run, SCHEMA, Stage, Warning};
@@ -42,6 +43,7 @@ pub struct Job<'a> {
     opened: usize,
     taken: Option<&'a Mutex<Taken>>,
     is_alone: bool,
+    skips_bad: bool,
 }
 
 impl<'a> Job<'a> {
@@ -66,6 +68,7 @@ impl<'a> Job<'a> {
             opened: 0,
             taken: None,
             is_alone: true,
+            skips_bad: false,
         }
     }
 
@@ -97,10 +100,25 @@ impl<'a> Job<'a> {
         self.output.as_ref().map(|target| target.format)
     }
 
+    /// The format in which a result of a kind is written, if one is.
+    pub fn output_format_for(&self, kind: Kind) -> Option<Format> {
+        self.output.as_ref().map(|target| target.format_for(kind))
+    }
+
+    /// Leaves bad points out of the clouds that are read from here on, when `skips` is true; see
+    /// [`Source::skipping_bad`].
+    pub fn skip_bad(&mut self, skips: bool) {
+        self.skips_bad = skips;
+    }
+
     /// Refuses, before any work, a result whose kind the output format cannot hold.
     pub fn expect_output(&self, kinds: &[Kind]) -> Result<()> {
         match &self.output {
-            Some(target) if !kinds.contains(&target.format.kind()) => {
+            Some(target)
+                if !kinds
+                    .iter()
+                    .any(|kind| target.format_for(*kind).kind() == *kind) =>
+            {
                 let made: Vec<_> = kinds.iter().map(|kind| kind.with_article()).collect();
                 let (made, held) = (made.join(" or "), target.format.kind().with_article());
                 Err(target.wrong(format!("holds {held}, but {made} is made here")))
@@ -159,7 +177,7 @@ impl<'a> Job<'a> {
         self.recorder.stage("read", 0);
         let word = &self.words[self.opened];
         self.opened += 1;
-        let source = Source::open(word, self.context.memory())?;
+        let source = Source::open(word, self.context.memory())?.skipping_bad(self.skips_bad);
         let (content, input, warnings) = reader(&source, self.format)?;
         self.read.push(input);
         self.warn(warnings);
@@ -221,7 +239,23 @@ impl<'a> Job<'a> {
 
     /// Writes the result, if the user wants it.
     pub fn write_mesh(&mut self, mesh: &Mesh) -> Result<()> {
-        self.write_with(|sink, format| io::write_mesh(mesh, sink, format))
+        self.write_with(Kind::Mesh, |sink, format| {
+            io::write_mesh(mesh, sink, format)
+        })
+    }
+
+    /// Writes the result, if the user wants it.
+    pub fn write_splats(&mut self, splats: &Splats) -> Result<()> {
+        self.write_with(Kind::Splats, |sink, format| {
+            io::write_splats(splats, sink, format)
+        })
+    }
+
+    /// Writes the result, if the user wants it, in a format that the name of its file does not tell.
+    pub fn write_splats_as(&mut self, splats: &Splats, format: Format) -> Result<()> {
+        self.write_with(Kind::Splats, |sink, _| {
+            io::write_splats(splats, sink, format)
+        })
     }
 
     /// Whether the result is a file for each of what a placeholder stands for.
@@ -280,27 +314,38 @@ impl<'a> Job<'a> {
                 return Err(Error::over_memory(what, needed, limit, hint));
             }
         }
-        self.write_with(|sink, format| io::write_volume(volume, sink, format))
+        self.write_with(Kind::Volume, |sink, format| {
+            io::write_volume(volume, sink, format)
+        })
     }
 
     /// Writes the result, if the user wants it.
     pub fn write_image(&mut self, image: &Image) -> Result<()> {
-        self.write_with(|sink, format| Ok((io::write_image(image, sink, format)?, Vec::new())))
+        self.write_with(Kind::Image, |sink, format| {
+            Ok((io::write_image(image, sink, format)?, Vec::new()))
+        })
     }
 
     /// Writes the result, if the user wants it.
     pub fn write_molecule(&mut self, molecule: &Molecule) -> Result<()> {
-        self.write_with(|sink, format| io::write_molecule(molecule, sink, format))
+        self.write_with(Kind::Molecule, |sink, format| {
+            io::write_molecule(molecule, sink, format)
+        })
     }
 
     /// Writes the result, if the user wants it.
     pub fn write_animation(&mut self, clip: &Clip) -> Result<()> {
-        self.write_with(|sink, format| io::write_animation(clip, sink, format))
+        self.write_with(Kind::Animation, |sink, format| {
+            io::write_animation(clip, sink, format)
+        })
     }
 
     /// Writes the bytes of the result, which is in the format of its place, if the user wants it.
     pub fn write_bytes(&mut self, bytes: &[u8]) -> Result<()> {
-        self.write_with(|sink, format| {
+        let Some(kind) = self.output_format().map(Format::kind) else {
+            return Ok(());
+        };
+        self.write_with(kind, |sink, format| {
             let output = sink.write(format, |out| out.write_all(bytes))?;
             Ok((vec![output], Vec::new()))
         })
@@ -308,6 +353,7 @@ impl<'a> Job<'a> {
 
     fn write_with(
         &mut self,
+        kind: Kind,
         writer: impl FnOnce(&Sink, Format) -> Result<(Vec<Output>, Vec<Warning>)>,
     ) -> Result<()> {
         let Some(target) = &self.output else {
@@ -315,7 +361,7 @@ impl<'a> Job<'a> {
         };
         self.recorder.stage("write", 0);
         target.place.prepare()?;
-        let written = writer(&target.place.sink, target.format);
+        let written = writer(&target.place.sink, target.format_for(kind));
         let (outputs, warnings) = written.map_err(|error| match error {
             // The library knows the format, not what named it.
             Error::Parameter {

@@ -32,6 +32,7 @@ mod man;
 mod schema;
 mod shadow;
 mod smooth_mc;
+mod splat_gen;
 mod stability;
 mod tradeoff;
 mod tunnels;
@@ -53,6 +54,7 @@ fn run(command: &Command) -> Exit {
     let ended = match command {
         Command::Voxelize(args) => voxelize::run(args),
         Command::Shadow(args) => shadow::run(args),
+        Command::SplatGen(args) => splat_gen::run(args),
         Command::SmoothMc(args) => smooth_mc::run(args),
         Command::Isosurface(args) => isosurface::run(args),
         Command::Tunnels(args) => tunnels::run(args),

@@ -3,8 +3,8 @@
 use crate::exit::Exit;
 use crate::streams::print;
 use crate::{
-    compare, compress_anim, convert, formats, info, isosurface, shadow, smooth_mc, stability,
-    tradeoff, tunnels, voxelize, words,
+    compare, compress_anim, convert, formats, info, isosurface, shadow, smooth_mc, splat_gen,
+    stability, tradeoff, tunnels, voxelize, words,
 };
 use clap::builder::PossibleValuesParser;
 use scantle::error::Result;
@@ -41,6 +41,7 @@ const SCHEMAS: &[Row] = &[
     ("tunnels", || schema_for!(tunnels::Report)),
     ("shadow", || schema_for!(shadow::Report)),
     ("smooth-mc", || schema_for!(smooth_mc::Report)),
+    ("splat-gen", || schema_for!(splat_gen::Report)),
     ("stability", || schema_for!(stability::Report)),
     ("tradeoff", || schema_for!(tradeoff::Report)),
     ("voxelize", || schema_for!(voxelize::Report)),

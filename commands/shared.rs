@@ -29,6 +29,14 @@ pub struct InputFormat {
     pub input_format: Option<Format>,
 }
 
+/// What becomes of points that are none.
+#[derive(Debug, Args)]
+pub struct SkipBad {
+    /// Leave out points of clouds that have a number which is not finite; a warning counts them
+    #[arg(long, help_heading = IN_AND_OUT)]
+    pub skip_bad: bool,
+}
+
 /// Where the result goes.
 #[derive(Debug, Args)]
 pub struct Output {
@@ -161,6 +169,14 @@ pub fn named<T: Clone + Send + Sync + 'static>(
 ) -> impl TypedValueParser<Value = T> {
     PossibleValuesParser::new(names)
         .try_map(move |name| value(&name).ok_or("not a name in the list"))
+}
+
+/// What a word names; `wanted` says what it may be.
+pub fn parsed<T: Clone + Send + Sync + 'static>(
+    value: fn(&str) -> Option<T>,
+    wanted: &'static str,
+) -> impl Fn(&str) -> Result<T, String> + Clone + Send + Sync + 'static {
+    move |word| value(word).ok_or_else(|| format!("not {wanted}"))
 }
 
 /// `N` finite numbers with commas between them.

@@ -401,6 +401,9 @@ fn read_back(path: &Path, format: Format) -> Result<Option<Content>> {
     Ok(Some(content))
 }
 
+/// Sides of the polygons that stand for discs where these are compared.
+const SIDES: usize = 6;
+
 /// `order` tells which vertex of the reference each is, where an input has them in another order.
 fn drift(
     reference: &Made,
@@ -416,6 +419,10 @@ fn drift(
     match (a, b) {
         (Content::Volume(a), Content::Volume(b)) => Ok(volume_drift(a, b, motion)),
         (Content::Mesh(a), Content::Mesh(b)) => mesh_drift(a, b, motion).map_err(broken),
+        (Content::Splats(a), Content::Splats(b)) => {
+            let polygons = |splats| io::splats::discs(splats, SIDES).map_err(broken);
+            mesh_drift(&polygons(a)?, &polygons(b)?, motion).map_err(broken)
+        }
         (Content::Animation(a), Content::Animation(b)) => {
             clip_drift(a, b, motion, order).map_err(broken)
         }

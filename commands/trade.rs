@@ -1,6 +1,7 @@
 //! Which commands trade accuracy for time, and why the others do not.
 
 use scantle::anim::compress;
+use scantle::points::splat;
 use scantle::protein::tunnels;
 use scantle::render::shadow;
 use scantle::trade::Trade;
@@ -42,6 +43,7 @@ pub const TABLE: &[(&str, Declared)] = &[
     ("shadow", Declared::Trade(&shadow::TRADE)),
     ("smooth-mc", Declared::Trade(&smooth_mc::TRADE)),
     ("tunnels", Declared::Trade(&tunnels::TRADE)),
+    ("splat-gen", Declared::Trade(&splat::TRADE)),
     ("compress-anim encode", Declared::Trade(&compress::TRADE)),
     ("compress-anim", Declared::None("its verb `encode` has one")),
     (

@@ -26,6 +26,7 @@ pub fn content(content: &Content) -> String {
         (content.triangles, "triangle", "triangles"),
         (content.segments, "segment", "segments"),
         (content.points, "point", "points"),
+        (content.splats, "splat", "splats"),
         (content.atoms, "atom", "atoms"),
         (content.residues, "residue", "residues"),
         (content.models, "model", "models"),

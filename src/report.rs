@@ -85,6 +85,9 @@ pub struct Content {
     /// Points that stand alone.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub points: Option<u64>,
+    /// Splats.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub splats: Option<u64>,
     /// Voxels along x, y, z.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub dims: Option<[u64; 3]>,

@@ -4,11 +4,15 @@
 //! `UPDATE_FIXTURES=1 cargo test fixtures` writes them anew.
 
 use crate::support::{Workplace, files_below, root, updating};
+use scantle::io::format::{Format, Kind};
 use scantle::io::sink::Sink;
 use scantle::io::source::Source;
-use scantle::io::{read_mesh, read_molecule, write_mesh, write_molecule, write_volume};
+use scantle::io::{
+    read_mesh, read_molecule, write_mesh, write_molecule, write_splats, write_volume,
+};
 use scantle::mesh::{Mesh, shapes};
 use scantle::numeric::vector::{add, cross, dot, length, normalize, scale, sub};
+use scantle::points::{Splat, Splats};
 use scantle::progress::Silent;
 use scantle::protein::builder::{Builder, Place};
 use scantle::protein::{Atom, Element, Molecule, Name};
@@ -46,6 +50,26 @@ const MESHES: &[Row<Mesh>] = &[
         ..helix(96)
     }),
 ];
+
+const CLOUDS: &[Row<Mesh>] = &[
+    ("clouds/hills.ply", hills),
+    ("clouds/hills.pcd", hills),
+    ("clouds/hills.csv", hills),
+    ("clouds/hills.xyz", || Mesh {
+        classes: None,
+        ..hills()
+    }),
+    ("clouds/hills.las", || Mesh {
+        normals: None,
+        ..hills()
+    }),
+    ("clouds/hills.laz", || Mesh {
+        normals: None,
+        ..hills()
+    }),
+];
+
+const SPLATS: &[Row<Splats>] = &[("clouds/splats.ply", splats_of_hills)];
 
 const VOLUMES: &[Row<Volume>] = &[
     ("volumes/ball.nrrd", || ball(16)),
@@ -283,6 +307,85 @@ fn helix(n: u32) -> Mesh {
     }
 }
 
+/// A scan of 12 by 9 points, a metre apart, of ground (2) with a house (6) on it, in metres of a map:
+/// hundredths of a metre far from the origin. Only sums, products and roots: the same on every system.
+fn hills() -> Mesh {
+    let point = |i: u32| {
+        let (x, y) = (f64::from(i % 12), f64::from(i / 12));
+        let is_roof = (4..8).contains(&(i % 12)) && (3..6).contains(&(i / 12));
+        let slope = [(6.0 - x) / 12.0, (y - 4.0) / 16.0];
+        let height = if is_roof {
+            f64::from(i % 12) / 4.0 + 7.0
+        } else {
+            (x * (12.0 - x) + y * (y - 8.0) * 0.75) / 24.0
+        };
+        let lean = if is_roof { [0.25, 0.0] } else { slope };
+        let position = [
+            637_000.25 + x,
+            849_500.5 + y,
+            ((height + 406.0) * 100.0).round() / 100.0,
+        ];
+        (position, normalize([-lean[0], -lean[1], 1.0]), is_roof)
+    };
+    let points: Vec<_> = (0..108).map(point).collect();
+    let color = |is_roof: bool| {
+        if is_roof {
+            [1.0, 0.2, 0.0, 1.0]
+        } else {
+            [0.2, 0.6, 0.4, 1.0]
+        }
+    };
+    Mesh {
+        positions: points.iter().map(|(position, _, _)| *position).collect(),
+        points: (0..108).collect(),
+        normals: Some(points.iter().map(|(_, normal, _)| *normal).collect()),
+        colors: Some(
+            points
+                .iter()
+                .map(|(_, _, is_roof)| color(*is_roof))
+                .collect(),
+        ),
+        classes: Some(
+            points
+                .iter()
+                .map(|(_, _, is_roof)| if *is_roof { 6 } else { 2 })
+                .collect(),
+        ),
+        ..Mesh::default()
+    }
+}
+
+/// A disc for every fourth point of [`hills`], of radius 1.5.
+fn splats_of_hills() -> Splats {
+    let hills = hills();
+    let normals = hills.normals.expect("normals");
+    let splat = |point: u32| {
+        let at = point as usize;
+        let normal = normals[at];
+        Splat {
+            centre: hills.positions[at],
+            normal,
+            tangent: normalize(cross([0.0, 1.0, 0.0], normal)),
+            radius: 1.5,
+            field: scale(normal, 0.96875),
+            slopes: [0.0625, -0.03125],
+            error: 0.125,
+            count: 9,
+            source: point,
+        }
+    };
+    let chosen = (0..108).step_by(4);
+    Splats {
+        splats: chosen.clone().map(splat).collect(),
+        colors: hills
+            .colors
+            .map(|all| chosen.clone().map(|v| all[v as usize]).collect()),
+        classes: hills
+            .classes
+            .map(|all| chosen.map(|v| all[v as usize]).collect()),
+    }
+}
+
 /// The signed distance to a sphere of radius 0.75 around the origin, positive inside, in a cube
 /// of edge 2 with `n` samples along each axis.
 fn ball(n: usize) -> Volume {
@@ -415,9 +518,15 @@ fn made_fixtures_are_current() {
             stale.push(name.to_owned());
         }
     };
-    for (name, make) in MESHES {
+    for (name, make) in SPLATS {
+        check(name, &|sink| {
+            write_splats(&make(), sink, Format::Splats).map(drop)
+        });
+    }
+    for (name, make) in MESHES.iter().chain(CLOUDS) {
         check(name, &|sink| {
             let format = sink.format().expect("the name tells the format");
+            let format = format.holding(Kind::Mesh);
             write_mesh(&make(), sink, format).map(drop)
         });
     }

@@ -69,6 +69,23 @@ const MADE: &[(&str, &str)] = &[
     ("a.csv", "convert fixtures/molecules/ring.xyzr -o a.csv"),
     ("a.pc2", "convert fixtures/animations/wave.mdd -o a.pc2"),
     ("a.mdd", "convert fixtures/animations/wave.pc2 -o a.mdd"),
+    ("a.pcd", "convert fixtures/clouds/hills.ply -o a.pcd"),
+    ("a.las", "convert fixtures/clouds/hills.ply -o a.las"),
+    ("a.laz", "convert fixtures/clouds/hills.ply -o a.laz"),
+    ("b.laz", "convert fixtures/shapes/points.ply -o b.laz"),
+    ("a.xyz", "convert fixtures/clouds/hills.ply -o a.xyz"),
+    (
+        "a.points-csv",
+        "convert fixtures/clouds/hills.ply -o a.points-csv --output-format points-csv",
+    ),
+    (
+        "a.splats",
+        "convert fixtures/clouds/splats.ply -o a.splats --output-format splats",
+    ),
+    (
+        "a.gaussians",
+        "convert fixtures/clouds/splats.ply -o a.gaussians --output-format gaussians",
+    ),
 ];
 
 /// Files that are read but not written like this.
@@ -122,13 +139,15 @@ const WRITTEN: &[(&str, &str)] = &[
     ),
 ];
 
-/// Files of other programs, below `fixtures/volumes/`.
+/// Files that are read but not written like this, as they lie from `fixtures/volumes/`.
 const FIXTURES: &[&str] = &[
     "nibabel-qform.nii",
     "nibabel-sform.nii.gz",
     "vtk-inline-zlib.vti",
     "vtk-base64.vti",
     "vtk-raw-zlib.vti",
+    "../clouds/packed.pcd",
+    "../clouds/holes.pcd",
 ];
 
 /// Values that have broken readers: the ends of ranges, and numbers that are none.
@@ -252,7 +271,8 @@ fn damaged_files_are_read_or_refused() {
     files.push(("packed.off.gz".to_owned(), packed(&files[5].1)));
     for name in FIXTURES {
         let path = root().join("fixtures/volumes").join(name);
-        files.push((name.to_string(), fs::read(path).expect("a fixture")));
+        let name = name.trim_start_matches("../clouds/").to_owned();
+        files.push((name, fs::read(path).expect("a fixture")));
     }
     let mut total = [0; 2];
     for (seed, (name, bytes)) in (0..).zip(&files) {

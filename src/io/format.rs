@@ -7,6 +7,8 @@ use crate::error::Fault;
 pub enum Kind {
     /// Triangles, polylines, points.
     Mesh,
+    /// Discs with a field of normals.
+    Splats,
     /// Voxels.
     Volume,
     /// Pixels.
@@ -24,6 +26,7 @@ impl Kind {
     pub fn name(self) -> &'static str {
         match self {
             Kind::Mesh => "mesh",
+            Kind::Splats => "splats",
             Kind::Volume => "volume",
             Kind::Image => "image",
             Kind::Molecule => "molecule",
@@ -36,6 +39,7 @@ impl Kind {
     pub fn with_article(self) -> &'static str {
         match self {
             Kind::Mesh => "a mesh",
+            Kind::Splats => "a set of splats",
             Kind::Volume => "a volume",
             Kind::Image => "an image",
             Kind::Molecule => "a molecule",
@@ -60,6 +64,20 @@ pub enum Format {
     Gltf,
     /// glTF 2.0, binary.
     Glb,
+    /// Point Cloud Data of the Point Cloud Library.
+    Pcd,
+    /// Laser scans as the ASPRS exchanges them.
+    Las,
+    /// Laser scans packed by LASzip.
+    Laz,
+    /// Points, of words.
+    Xyz,
+    /// Points, of words parted by commas.
+    PointsCsv,
+    /// scantle's PLY of splats.
+    Splats,
+    /// PLY of 3D Gaussians.
+    Gaussians,
     /// Nearly Raw Raster Data.
     Nrrd,
     /// MetaImage header with a data file.
@@ -104,11 +122,35 @@ pub enum Format {
 #[derive(Debug, Clone, Copy)]
 #[allow(missing_docs)]
 pub struct Holds {
+    pub faces: bool,
     pub polygons: bool,
     pub segments: bool,
     pub points: bool,
     pub normals: bool,
     pub colors: bool,
+    pub classes: bool,
+}
+
+impl Holds {
+    /// Triangles alone.
+    const TRIANGLES: Holds = Holds {
+        faces: true,
+        polygons: false,
+        segments: false,
+        points: false,
+        normals: false,
+        colors: false,
+        classes: false,
+    };
+    /// Vertices alone, with what they carry.
+    const CLOUD: Holds = Holds {
+        faces: false,
+        points: true,
+        normals: true,
+        colors: true,
+        classes: true,
+        ..Holds::TRIANGLES
+    };
 }
 
 /// A row of the table of formats.
@@ -183,6 +225,64 @@ const TABLE: &[Row] = &[
         (true, true),
         "glTF 2.0 in one binary file",
     ),
+    row(
+        Format::Pcd,
+        &["pcd"],
+        Kind::Mesh,
+        (true, true),
+        "PCD, point clouds in ascii, binary and binary_compressed; written binary",
+    ),
+    row(
+        Format::Las,
+        &["las"],
+        Kind::Mesh,
+        (true, true),
+        "LAS 1.0 to 1.4, point formats 0 to 10; written as 1.4",
+    ),
+    row(
+        Format::Laz,
+        &["laz"],
+        Kind::Mesh,
+        (true, true),
+        "LAZ: LAS whose points are packed by LASzip",
+    ),
+    row(
+        Format::Xyz,
+        &["xyz", "xyzn", "pts", "asc", "txt"],
+        Kind::Mesh,
+        (true, true),
+        "XYZ: a point on each line, with a normal, a colour or both",
+    ),
+    Row {
+        name: "points-csv",
+        ..row(
+            Format::PointsCsv,
+            &["csv"],
+            Kind::Mesh,
+            (true, true),
+            "points whose columns have names: x, y, z, nx, ny, nz, red, green, blue, classification",
+        )
+    },
+    Row {
+        name: "splats",
+        ..row(
+            Format::Splats,
+            &["ply"],
+            Kind::Splats,
+            (true, true),
+            "scantle's PLY of discs with a field of normals",
+        )
+    },
+    Row {
+        name: "gaussians",
+        ..row(
+            Format::Gaussians,
+            &["ply"],
+            Kind::Splats,
+            (true, true),
+            "PLY of 3D Gaussians of degree 0, in single precision",
+        )
+    },
     row(
         Format::Nrrd,
         &["nrrd"],
@@ -321,6 +421,9 @@ const TABLE: &[Row] = &[
     ),
 ];
 
+/// Formats whose extension is that of another, which is the one that it tells.
+const SHARING: [Format; 3] = [Format::PointsCsv, Format::Splats, Format::Gaussians];
+
 impl Format {
     /// All formats, in the order of the table.
     pub fn all() -> impl Iterator<Item = Format> {
@@ -377,13 +480,27 @@ impl Format {
             .map(|row| row.format)
     }
 
-    /// The format of a file name extension, in any case.
+    /// The format of a file name extension, in any case; see [`Format::holding`] for the extensions that
+    /// formats of several kinds share.
     pub fn from_extension(extension: &str) -> Option<Format> {
         let wanted = extension.to_ascii_lowercase();
         TABLE
             .iter()
-            .find(|row| row.extensions.contains(&wanted.as_str()))
-            .map(|row| row.format)
+            .map(|row| (row.format, row.extensions))
+            .filter(|(format, _)| !SHARING.contains(format))
+            .find(|(_, extensions)| extensions.contains(&wanted.as_str()))
+            .map(|(format, _)| format)
+    }
+
+    /// This format, or the one that files of its extension are in where they hold another kind.
+    ///
+    /// `.csv` may be of spheres or of points, `.ply` of a mesh or of splats.
+    pub fn holding(self, kind: Kind) -> Format {
+        match (self, kind) {
+            (Format::Ply, Kind::Splats) => Format::Splats,
+            (Format::SpheresCsv, Kind::Mesh) => Format::PointsCsv,
+            _ => self,
+        }
     }
 
     /// What a mesh may have beside triangles and be held by the writer of this format.
@@ -393,37 +510,39 @@ impl Format {
                 polygons: true,
                 segments: true,
                 points: true,
-                normals: false,
                 colors: true,
+                ..Holds::TRIANGLES
             },
             Format::Ply => Holds {
                 polygons: true,
                 segments: true,
-                points: true,
-                normals: true,
-                colors: true,
+                ..Holds {
+                    faces: true,
+                    ..Holds::CLOUD
+                }
             },
             Format::Off => Holds {
                 polygons: true,
-                segments: false,
-                points: false,
-                normals: false,
                 colors: true,
+                ..Holds::TRIANGLES
             },
             Format::Glb => Holds {
-                polygons: false,
                 segments: true,
                 points: true,
                 normals: true,
                 colors: true,
+                ..Holds::TRIANGLES
             },
-            _ => Holds {
-                polygons: false,
-                segments: false,
-                points: false,
+            Format::Pcd | Format::PointsCsv => Holds::CLOUD,
+            Format::Las | Format::Laz => Holds {
                 normals: false,
-                colors: false,
+                ..Holds::CLOUD
             },
+            Format::Xyz => Holds {
+                classes: false,
+                ..Holds::CLOUD
+            },
+            _ => Holds::TRIANGLES,
         }
     }
 }
@@ -435,7 +554,7 @@ impl Format {
 pub fn sniff(bytes: &[u8], extension: Option<&str>) -> Result<Format, Fault> {
     let by_name = extension.and_then(Format::from_extension);
     if bytes.starts_with(b"ply\n") || bytes.starts_with(b"ply\r") {
-        return Ok(Format::Ply);
+        return Ok(super::splats::kind_of(bytes).unwrap_or(Format::Ply));
     }
     if bytes.starts_with(b"glTF") {
         return Ok(Format::Glb);
@@ -448,6 +567,12 @@ pub fn sniff(bytes: &[u8], extension: Option<&str>) -> Result<Format, Fault> {
     }
     if bytes.starts_with(b"#binvox") {
         return Ok(Format::Binvox);
+    }
+    if let Some(is_packed) = super::las::is_packed(bytes) {
+        return Ok(if is_packed { Format::Laz } else { Format::Las });
+    }
+    if super::pcd::is_document(bytes) {
+        return Ok(Format::Pcd);
     }
     if bytes.starts_with(super::svo::MAGIC) {
         return Ok(Format::Svo);
@@ -474,7 +599,11 @@ pub fn sniff(bytes: &[u8], extension: Option<&str>) -> Result<Format, Fault> {
     if by_name == Some(Format::Stl) || super::stl::is_binary(bytes) {
         return Ok(Format::Stl);
     }
-    if let Some(format) = by_name {
+    if by_name == Some(Format::SpheresCsv) && super::xyz::is_document(bytes) {
+        return Ok(Format::PointsCsv);
+    }
+    // Names such as `.txt` tell little: whatever text is known goes before them.
+    if let Some(format) = by_name.filter(|format| *format != Format::Xyz) {
         return Ok(format);
     }
     if super::mdd::is_exact(bytes) {
@@ -504,6 +633,9 @@ pub fn sniff(bytes: &[u8], extension: Option<&str>) -> Result<Format, Fault> {
     }
     if super::xyzr::is_document(text) {
         return Ok(Format::SpheresCsv);
+    }
+    if by_name == Some(Format::Xyz) || super::xyz::is_document(text) {
+        return Ok(Format::Xyz);
     }
     let names: Vec<_> = Format::all()
         .filter(|f| f.is_read())

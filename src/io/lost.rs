@@ -1,9 +1,11 @@
 //! What of a mesh, a molecule or an animation a format leaves out.
 
 use super::format::Format;
-use super::{pdb, pointcache};
+use super::{cloud, las, pdb, pointcache};
 use crate::anim::Clip;
+use crate::error::number;
 use crate::mesh::{Mesh, Polygons};
+use crate::points::Splats;
 use crate::protein::Molecule;
 use crate::report::Warning;
 
@@ -100,6 +102,23 @@ pub fn dropped_of_clip(clip: &Clip, format: Format) -> Vec<Warning> {
     lost
 }
 
+/// What of splats a format leaves out.
+pub fn dropped_of_splats(splats: &Splats, format: Format) -> Vec<Warning> {
+    let mut lost = Vec::new();
+    if format == Format::Gaussians {
+        let count = splats.splats.len() as u64;
+        let message =
+            "gaussians files hold single precision, and no field of normals, counts or sources";
+        lost.push(Warning::new("dropped-fields", message, count, None));
+        let classes = splats.classes.as_ref().map_or(0, Vec::len) as u64;
+        if classes > 0 {
+            let message = "gaussians files hold no classes; left out";
+            lost.push(Warning::new("dropped-classes", message, classes, None));
+        }
+    }
+    lost
+}
+
 /// What of a mesh a format leaves out.
 pub fn dropped(mesh: &Mesh, format: Format) -> Vec<Warning> {
     let mut lost = Vec::new();
@@ -128,6 +147,17 @@ pub fn dropped(mesh: &Mesh, format: Format) -> Vec<Warning> {
             mesh.colors.as_ref().map_or(0, Vec::len),
         );
     }
+    if !holds.classes {
+        note(
+            "dropped-classes",
+            "classes of vertices",
+            mesh.classes.as_ref().map_or(0, Vec::len),
+        );
+    }
+    if !holds.faces {
+        note("dropped-faces", "faces", mesh.face_count());
+        return lost_of_cloud(mesh, format, lost);
+    }
     if format != Format::Ply {
         note(
             "dropped-labels",
@@ -149,6 +179,42 @@ pub fn dropped(mesh: &Mesh, format: Format) -> Vec<Warning> {
             "faces of more than three corners",
             mesh.polygons.as_ref().map_or(0, Polygons::len),
         );
+    }
+    lost
+}
+
+/// What else a format leaves out that holds all vertices and nothing but them.
+fn lost_of_cloud(mesh: &Mesh, format: Format, mut lost: Vec<Warning>) -> Vec<Warning> {
+    let name = format.name();
+    let mut note = |code: &str, message: String, count: u64, first: Option<u64>| {
+        if count > 0 {
+            lost.push(Warning::new(code, message, count, first));
+        }
+    };
+    let message = format!("{name} files hold no polylines; left out");
+    note(
+        "dropped-segments",
+        message,
+        mesh.segments.len() as u64,
+        None,
+    );
+    let is_las = matches!(format, Format::Las | Format::Laz);
+    if is_las {
+        let (count, first, step) = las::rounded(mesh);
+        let step = number(step);
+        let message =
+            format!("coordinates that are no multiple of the step of up to {step} are rounded");
+        note("rounded-coordinates", message, count, first);
+    } else {
+        let (count, first) = cloud::rounded_colors(mesh);
+        let message = format!("{name} files hold colours in bytes; rounded");
+        note("rounded-colours", message, count, first);
+    }
+    if is_las || format == Format::Xyz {
+        let colors = mesh.colors.iter().flatten();
+        let count = colors.filter(|color| color[3] != 1.0).count() as u64;
+        let message = format!("{name} files hold no opacity; left out");
+        note("dropped-opacity", message, count, None);
     }
     lost
 }

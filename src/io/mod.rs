@@ -7,12 +7,14 @@
 
 mod base64;
 pub mod binvox;
+mod cloud;
 pub mod format;
 mod gather;
 pub mod gltf;
 mod header;
 mod hybrid36;
 pub mod json;
+pub mod las;
 mod lost;
 pub mod mdd;
 pub mod metaimage;
@@ -23,6 +25,7 @@ pub mod nrrd;
 pub mod obj;
 pub mod off;
 pub mod pc2;
+pub mod pcd;
 pub mod pdb;
 #[cfg(test)]
 mod peers;
@@ -36,12 +39,14 @@ mod sanim;
 pub mod sequence;
 pub mod sink;
 pub mod source;
+pub mod splats;
 pub mod stl;
 pub mod svo;
 mod text;
 pub mod vdb;
 pub mod vti;
 mod xml;
+pub mod xyz;
 pub mod xyzr;
 
 #[cfg(test)]
@@ -53,12 +58,13 @@ use crate::anim::Clip;
 use crate::error::{Error, Fault, Result};
 use crate::image::samples::Image;
 use crate::mesh::Mesh;
+use crate::points::Splats;
 use crate::protein::Molecule;
-use crate::report::{self, Input, Output, Warning};
+use crate::report::{self, Input, Output, Tally, Warning};
 use crate::volume::Volume;
 use crate::volume::bits::BitGrid;
 use format::{Format, Kind};
-use lost::{dropped, dropped_of_clip, dropped_of_molecule};
+use lost::{dropped, dropped_of_clip, dropped_of_molecule, dropped_of_splats};
 use refusal::Refusal;
 use serde_json::Value;
 use sink::Sink;
@@ -71,6 +77,8 @@ use std::path::{Path, PathBuf};
 pub enum Content {
     /// Triangles, polylines, points.
     Mesh(Mesh),
+    /// Discs with a field of normals.
+    Splats(Splats),
     /// Voxels.
     Volume(Volume),
     /// Pixels.
@@ -88,6 +96,7 @@ impl Content {
     pub fn kind(&self) -> Kind {
         match self {
             Content::Mesh(_) => Kind::Mesh,
+            Content::Splats(_) => Kind::Splats,
             Content::Volume(_) => Kind::Volume,
             Content::Image(_) => Kind::Image,
             Content::Molecule(_) => Kind::Molecule,
@@ -117,6 +126,7 @@ pub fn read(source: &Source, format: Option<Format>) -> Result<(Content, Input, 
     let content = content.map_err(|refusal| refusal.of(source))?;
     let described = match &content {
         Content::Mesh(mesh) => mesh.content(),
+        Content::Splats(splats) => splats::content(splats),
         Content::Volume(volume) => volume.content(),
         Content::Image(image) => image.content(),
         Content::Molecule(molecule) => molecule.content(),
@@ -142,12 +152,17 @@ fn input(source: &Source, format: Format, digest: String, content: report::Conte
 }
 
 fn parse(source: &Source, format: Format, warnings: &mut Vec<Warning>) -> Result<Content, Refusal> {
-    let content = match format {
+    let mut content = match format {
         Format::Obj => Content::Mesh(obj::read(source, warnings)?),
         Format::Ply => Content::Mesh(ply::read(source, warnings)?),
         Format::Stl => Content::Mesh(stl::read(source, warnings)?),
         Format::Off => Content::Mesh(off::read(source, warnings)?),
         Format::Gltf | Format::Glb => Content::Mesh(gltf::read(source, warnings)?),
+        Format::Pcd => Content::Mesh(pcd::read(source, warnings)?),
+        Format::Las | Format::Laz => Content::Mesh(las::read(source, warnings)?),
+        Format::Xyz | Format::PointsCsv => Content::Mesh(xyz::read(source, warnings)?),
+        Format::Splats => Content::Splats(splats::read(source, warnings)?),
+        Format::Gaussians => Content::Splats(splats::read_gaussians(source, warnings)?),
         Format::Nrrd => Content::Volume(nrrd::read(source, warnings)?),
         Format::Mhd | Format::Mha => Content::Volume(metaimage::read(source, warnings)?),
         Format::Nifti => Content::Volume(nifti::read(source, warnings)?),
@@ -167,8 +182,9 @@ fn parse(source: &Source, format: Format, warnings: &mut Vec<Warning>) -> Result
         Format::Json => Content::Report(json::read(source, warnings)?),
         Format::Vdb => return Err(Fault::whole("vdb files are written, not read").into()),
     };
-    match &content {
-        Content::Mesh(mesh) => mesh.check()?,
+    match &mut content {
+        Content::Mesh(mesh) => settle(mesh, source, warnings)?,
+        Content::Splats(splats) => splats::check(splats)?,
         Content::Volume(volume) => volume.check()?,
         Content::Image(image) => image.check()?,
         Content::Molecule(molecule) => molecule.check()?,
@@ -176,6 +192,28 @@ fn parse(source: &Source, format: Format, warnings: &mut Vec<Warning>) -> Result
         Content::Report(_) => {}
     }
     Ok(content)
+}
+
+/// Holds a mesh to what every reader promises, once bad points of a cloud are left out where the source
+/// asks for that.
+fn settle(mesh: &mut Mesh, source: &Source, warnings: &mut Vec<Warning>) -> Result<(), Fault> {
+    if !mesh.is_cloud() {
+        return mesh.check();
+    }
+    if source.skips_bad() {
+        cloud::skip_bad(mesh, warnings);
+        if mesh.positions.is_empty() {
+            return Err(Fault::whole("holds no points that are finite"));
+        }
+    }
+    mesh.check().map_err(|fault| fault.with_hint(cloud::SKIP))?;
+    let normals = mesh.normals.iter().flatten().zip(0u64..);
+    let mut zero = Tally::default();
+    normals
+        .filter(|(normal, _)| **normal == [0.0; 3])
+        .for_each(|(_, v)| zero.note(v));
+    zero.warn("zero-normals", "normals without a direction", warnings);
+    Ok(())
 }
 
 /// The files beside an input that reading it opens too: those its header names.
@@ -219,6 +257,17 @@ pub fn read_mesh(source: &Source, format: Option<Format>) -> Result<(Mesh, Input
     match read(source, format)? {
         (Content::Mesh(mesh), input, warnings) => Ok((mesh, input, warnings)),
         (other, input, _) => Err(wrong_kind(source, &input.format, &other, &[Kind::Mesh])),
+    }
+}
+
+/// Reads splats; a file of another kind is an error.
+pub fn read_splats(
+    source: &Source,
+    format: Option<Format>,
+) -> Result<(Splats, Input, Vec<Warning>)> {
+    match read(source, format)? {
+        (Content::Splats(splats), input, warnings) => Ok((splats, input, warnings)),
+        (other, input, _) => Err(wrong_kind(source, &input.format, &other, &[Kind::Splats])),
     }
 }
 
@@ -320,10 +369,30 @@ pub fn write_mesh(mesh: &Mesh, sink: &Sink, format: Format) -> Result<(Vec<Outpu
         Format::Stl => stl::write,
         Format::Off => off::write,
         Format::Glb => gltf::write,
+        Format::Pcd => pcd::write,
+        Format::Las => las::write,
+        Format::Laz => las::write_packed,
+        Format::Xyz => xyz::write,
+        Format::PointsCsv => xyz::write_csv,
         _ => return Err(cannot_hold(format, Kind::Mesh)),
     };
     let output = sink.write(format, |out| writer(mesh, out))?;
     Ok((vec![output], dropped(mesh, format)))
+}
+
+/// Writes splats. Returns the lines for the report and warnings about what the format cannot hold.
+pub fn write_splats(
+    splats: &Splats,
+    sink: &Sink,
+    format: Format,
+) -> Result<(Vec<Output>, Vec<Warning>)> {
+    let writer: fn(&Splats, &mut dyn Write) -> std::io::Result<()> = match format {
+        Format::Splats => splats::write,
+        Format::Gaussians => splats::write_gaussians,
+        _ => return Err(cannot_hold(format, Kind::Splats)),
+    };
+    let output = sink.write(format, |out| writer(splats, out))?;
+    Ok((vec![output], dropped_of_splats(splats, format)))
 }
 
 /// Writes an image. Returns the lines for the report; nothing is lost.

@@ -450,7 +450,7 @@ mod tests {
     proptest! {
         #[test]
         fn what_was_written_reads_back(mesh in roundtrip::mesh(Content {
-            normals: false, segments: false, points: false, ..Content::ALL
+            normals: false, classes: false, segments: false, points: false, ..Content::ALL
         })) {
             let mut bytes = Vec::new();
             write(&mesh, &mut bytes).unwrap();

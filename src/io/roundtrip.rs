@@ -12,6 +12,7 @@ use proptest::prelude::*;
 pub struct Content {
     pub normals: bool,
     pub colors: bool,
+    pub classes: bool,
     pub segments: bool,
     pub points: bool,
 }
@@ -20,6 +21,7 @@ impl Content {
     pub const ALL: Content = Content {
         normals: true,
         colors: true,
+        classes: true,
         segments: true,
         points: true,
     };
@@ -87,20 +89,26 @@ pub fn mesh(content: Content) -> impl Strategy<Value = Mesh> {
         let attributes = (
             prop::option::of(normals).prop_map(move |n| n.filter(|_| content.normals)),
             prop::option::of(colors(n)).prop_map(move |c| c.filter(|_| content.colors)),
+            prop::option::of(prop::collection::vec(any::<u8>(), n))
+                .prop_map(move |c| c.filter(|_| content.classes)),
         );
         (Just(positions), faces, segments, points, attributes)
             .prop_map(|(p, f, s, o, a)| assembled(p, &f, s, o, a))
     })
 }
 
-type Attributes = (Option<Vec<[f64; 3]>>, Option<Vec<[f32; 4]>>);
+type Attributes = (
+    Option<Vec<[f64; 3]>>,
+    Option<Vec<[f32; 4]>>,
+    Option<Vec<u8>>,
+);
 
 fn assembled(
     positions: Vec<[f64; 3]>,
     faces: &[Vec<u32>],
     segments: Vec<[u32; 2]>,
     points: Vec<u32>,
-    (normals, colors): Attributes,
+    (normals, colors, classes): Attributes,
 ) -> Mesh {
     let mut mesh = Mesh {
         positions,
@@ -108,6 +116,7 @@ fn assembled(
         points,
         normals,
         colors,
+        classes,
         ..Mesh::default()
     };
     let mut polygons = Polygons::default();

@@ -18,6 +18,7 @@ pub struct Source {
     stored: Bytes,
     unpacked: Option<Vec<u8>>,
     limit: u64,
+    skips_bad: bool,
 }
 
 #[derive(Debug)]
@@ -79,6 +80,7 @@ impl Source {
             stored,
             unpacked,
             limit,
+            skips_bad: false,
         })
     }
 
@@ -117,6 +119,18 @@ impl Source {
         } else {
             Some(extension)
         }
+    }
+
+    /// The same source, of whose clouds the points that have a number which is not finite are left out,
+    /// with a counted warning, when `skips` is true. Else, as without this, they are refused.
+    pub fn skipping_bad(mut self, skips: bool) -> Self {
+        self.skips_bad = skips;
+        self
+    }
+
+    /// Whether points that have a number which is not finite are left out of clouds.
+    pub fn skips_bad(&self) -> bool {
+        self.skips_bad
     }
 
     /// How many bytes a reader may hold at most.

@@ -9,6 +9,7 @@ pub mod passage;
 pub mod report_difference;
 mod sides;
 pub mod smooth_error;
+pub mod splat_cover;
 pub mod splat_error;
 pub mod stability;
 mod surface;

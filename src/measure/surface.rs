@@ -3,7 +3,7 @@
 use crate::error::{Error, Fault, Result};
 use crate::mesh::Mesh;
 use crate::mesh::distance::{Closest, point_triangle};
-use crate::numeric::rng::Rng;
+use crate::mesh::sampling::{self, Place};
 use crate::numeric::vector::{Vec3, add, cross, length, scale, sub};
 use crate::spatial::aabb::Aabb;
 use crate::spatial::bvh::{Bvh, Nearest};
@@ -200,29 +200,8 @@ impl Surface {
     /// Each depends on the seed and its index alone.
     pub fn samples(&self, count: u64, seed: u64) -> Vec<Vec3> {
         let extents: Vec<f64> = self.corners.par_iter().map(|c| self.extent(c)).collect();
-        let mut total = 0.0;
-        let up_to: Vec<f64> = extents
-            .iter()
-            .map(|e| {
-                total += e;
-                total
-            })
-            .collect();
-        if total == 0.0 {
-            return Vec::new();
-        }
-        let last = up_to.partition_point(|sum| *sum < total);
-        (0..count)
-            .into_par_iter()
-            .map(|i| {
-                let mut rng = Rng::new(seed, i);
-                let place = (i as f64 + rng.unit()) / count as f64 * total;
-                let element = up_to.partition_point(|sum| *sum <= place).min(last);
-                // How far into the element the place is: samples are spread evenly in there too.
-                let share = 1.0 - (up_to[element] - place) / extents[element];
-                self.point_in(element, share.clamp(0.0, 1.0), rng.unit())
-            })
-            .collect()
+        let places = sampling::spread(&extents, count, seed);
+        places.par_iter().map(|p| self.point_at(p)).collect()
     }
 
     fn extent(&self, [a, b, c]: &[Vec3; 3]) -> f64 {
@@ -233,16 +212,11 @@ impl Surface {
         }
     }
 
-    /// The point of an element for two numbers from 0 to 1; equal areas for equal areas.
-    fn point_in(&self, element: usize, along: f64, across: f64) -> Vec3 {
-        let [a, b, c] = self.corners[element];
-        let (u, v) = match self.kind {
-            // Osada, Funkhouser, Chazelle, Dobkin 2002, "Shape distributions", section 4.2.
-            Kind::Triangles => {
-                let root = along.sqrt();
-                (root * (1.0 - across), root * across)
-            }
-            _ => (along, 0.0),
+    fn point_at(&self, place: &Place) -> Vec3 {
+        let [a, b, c] = self.corners[place.element];
+        let [u, v] = match self.kind {
+            Kind::Triangles => sampling::in_triangle(place),
+            _ => [place.along, 0.0],
         };
         add(a, add(scale(sub(b, a), u), scale(sub(c, a), v)))
     }

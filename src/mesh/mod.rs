@@ -1,8 +1,10 @@
 //! Meshes: triangles, polylines and points over one list of vertices.
 
+pub mod cloud;
 pub mod distance;
 pub mod identify;
 pub mod polygon;
+pub mod sampling;
 pub mod shapes;
 pub mod topology;
 pub mod tracer;
@@ -239,7 +241,13 @@ impl Mesh {
         }
         let normals = self.normals.as_ref().map(Vec::len);
         let colors = self.colors.as_ref().map(Vec::len);
-        for (what, length) in [("normals", normals), ("colours", colors)] {
+        let classes = self.classes.as_ref().map(Vec::len);
+        let attributes = [
+            ("normals", normals),
+            ("colours", colors),
+            ("classes", classes),
+        ];
+        for (what, length) in attributes {
             if let Some(length) = length.filter(|length| *length != count) {
                 return Err(Fault::whole(format!(
                     "{length} {what} for {count} vertices"

@@ -6,12 +6,14 @@
 //! Objects and groups are merged; vertices, faces, lines and points keep the order of the file.
 //! Texture coordinates, normals (which belong to corners) and materials are left out, each with a
 //! counted warning; `mtllib` is never opened. A vertex may be `x y z`, `x y z w` (divided by w),
-//! `x y z r g b` or `x y z r g b a`. A file of vertices alone is a cloud of points.
+//! `x y z r g b` or `x y z r g b a`. A file of vertices alone is a cloud of points, and as many normals
+//! in it are theirs.
 //!
 //! The text is cut into parts at line ends. A first pass counts the lines and vertices of each, so
 //! that the second can parse all parts at once and still knows its line and how many vertices
 //! stand before it.
 
+mod normals;
 #[cfg(test)]
 mod tests;
 
@@ -71,7 +73,10 @@ pub fn read(source: &Source, warnings: &mut Vec<Warning>) -> Result<Mesh, Fault>
         return Err(Fault::whole("holds no vertices")
             .with_hint("is it an OBJ file? its vertices are lines such as: v 0.5 1 -2"));
     }
-    merge(&parsed, warnings)
+    let normals = normals::of_cloud(&parts, end, &starts, &parsed)?;
+    let mut mesh = merge(&parsed, normals.is_some(), warnings)?;
+    mesh.normals = normals;
+    Ok(mesh)
 }
 
 /// Cuts a text after line ends into parts of about `size` bytes; never within a continued line.
@@ -360,7 +365,11 @@ fn vertex_index(what: &str, word: &[u8], place: Place) -> Result<(u32, bool), Fa
     Ok((index as u32, index >= i128::from(place.so_far)))
 }
 
-fn merge(parts: &[Part], warnings: &mut Vec<Warning>) -> Result<Mesh, Fault> {
+fn merge(
+    parts: &[Part],
+    has_normals: bool,
+    warnings: &mut Vec<Warning>,
+) -> Result<Mesh, Fault> {
     let mut faces = Polygons::default();
     let corners = parts.iter().map(|p| p.faces.corners.len()).sum();
     let count: usize = parts.iter().map(|p| p.faces.len()).sum();
@@ -399,11 +408,11 @@ fn merge(parts: &[Part], warnings: &mut Vec<Warning>) -> Result<Mesh, Fault> {
     if mesh.is_empty() {
         mesh.points = (0..mesh.positions.len() as u32).collect();
     }
-    warn(parts, warnings);
+    warn(parts, has_normals, warnings);
     Ok(mesh)
 }
 
-fn warn(parts: &[Part], warnings: &mut Vec<Warning>) {
+fn warn(parts: &[Part], has_normals: bool, warnings: &mut Vec<Warning>) {
     let mut note = |field: fn(&Notes) -> Tally, code: &str, message: &str| {
         let mut sum = Tally::default();
         parts.iter().for_each(|p| sum.add(field(&p.notes)));
@@ -414,11 +423,13 @@ fn warn(parts: &[Part], warnings: &mut Vec<Warning>) {
         "ignored-texture-coordinates",
         "texture coordinates are not read",
     );
-    note(
-        |n| n.normals,
-        "ignored-normals",
-        "normals of corners are not read",
-    );
+    if !has_normals {
+        note(
+            |n| n.normals,
+            "ignored-normals",
+            "normals of corners are not read",
+        );
+    }
     note(
         |n| n.materials,
         "ignored-materials",

@@ -142,10 +142,23 @@ fn parts_know_what_stands_before_them() {
     );
 }
 
+#[test]
+fn as_many_normals_as_points_are_theirs() {
+    let (mesh, warnings) = read_text("vn 0 0 1\nv 1 2 3\nvn 1 0 0\nv 4 5 6\n").unwrap();
+    assert_eq!(mesh.normals, Some(vec![[0.0, 0.0, 1.0], [1.0, 0.0, 0.0]]));
+    assert!(mesh.is_cloud() && warnings.is_empty());
+    for text in ["vn 0 0 1\nv 1 2 3\nv 4 5 6\n", "vn 0 0 1\nv 1 2 3\np 1\n"] {
+        let (mesh, warnings) = read_text(text).unwrap();
+        assert_eq!((mesh.normals, &*warnings[0].code), (None, "ignored-normals"));
+    }
+    let said = read_text("v 1 2 3\nvn 0 1\n").unwrap_err().to_string();
+    assert_eq!(said, "2: normal has 2 numbers, but 3 are needed");
+}
+
 proptest! {
     #[test]
     fn what_was_written_reads_back(mesh in roundtrip::mesh(Content {
-        normals: false, ..Content::ALL
+        normals: false, classes: false, ..Content::ALL
     })) {
         let mut bytes = Vec::new();
         write(&mesh, &mut bytes).unwrap();

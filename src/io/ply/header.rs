@@ -114,6 +114,8 @@ pub struct Header {
     pub data: usize,
     /// Lines up to and with `end_header`.
     pub lines: u64,
+    /// What stands after `comment`.
+    pub comments: Vec<String>,
 }
 
 impl Header {
@@ -125,6 +127,7 @@ impl Header {
         };
         let mut encoding = None;
         let mut elements: Vec<Element> = Vec::new();
+        let mut comments = Vec::new();
         let (mut at, mut line) = (0, 0);
         loop {
             let Some(length) = bytes[at..].iter().position(|b| *b == end) else {
@@ -139,7 +142,13 @@ impl Header {
             let mut words = words(text);
             let keyword = words.next().unwrap_or_default();
             let rest: Vec<&[u8]> = match keyword {
-                b"comment" | b"obj_info" => continue,
+                b"comment" => {
+                    let comment = text.trim_ascii_start().strip_prefix(keyword);
+                    let comment = comment.unwrap_or_default().trim_ascii();
+                    comments.push(String::from_utf8_lossy(comment).into_owned());
+                    continue;
+                }
+                b"obj_info" => continue,
                 _ => words.by_ref().take(6).collect(),
             };
             match (keyword, line) {
@@ -184,6 +193,7 @@ impl Header {
             elements,
             data: at,
             lines: line,
+            comments,
         })
     }
 }

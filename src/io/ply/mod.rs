@@ -1,6 +1,6 @@
 //! Stanford PLY: ascii, and binary of both byte orders.
 //!
-//! Read are the elements `vertex` (positions, normals, colours), `face`, `tristrips`, `edge`
+//! Read are the elements `vertex` (positions, normals, colours, classes), `face`, `tristrips`, `edge`
 //! (segments) and `point` (vertices that stand alone beside faces: scantle's own). Everything else
 //! is stepped over, with a counted warning. A file without faces and edges is a cloud of points.
 //!
@@ -10,12 +10,15 @@
 mod faces;
 mod header;
 mod rows;
+mod table;
 mod vertices;
 mod write;
 
+pub use table::{Table, table, vertex_properties};
 pub use write::write;
 
 use crate::error::Fault;
+use crate::io::cloud;
 use crate::io::source::Source;
 use crate::mesh::polygon::set_faces;
 use crate::mesh::{Mesh, Polygons};
@@ -42,6 +45,7 @@ pub fn read(source: &Source, warnings: &mut Vec<Warning>) -> Result<Mesh, Fault>
     let bytes = source.bytes();
     let header = Header::parse(bytes)?;
     let mut reader = Reader::new(&header)?;
+    reader.keeps_bad = source.skips_bad() && reader.is_cloud();
     let rest = match header.encoding {
         Encoding::Ascii => {
             let mut rows = Ascii::new(&bytes[header.data..], header.lines);
@@ -74,6 +78,10 @@ struct Reader<'h> {
     triangles: Vec<[u32; 3]>,
     /// Faces, when they were read one by one.
     faces: Polygons,
+    /// Classes as they stand in the file.
+    classes: Vec<f64>,
+    /// Whether vertices with a number that is not finite are left to who asked for them.
+    keeps_bad: bool,
 }
 
 impl<'h> Reader<'h> {
@@ -90,7 +98,16 @@ impl<'h> Reader<'h> {
             mesh: Mesh::default(),
             triangles: Vec::new(),
             faces: Polygons::default(),
+            classes: Vec::new(),
+            keeps_bad: false,
         })
+    }
+
+    /// Whether no element refers to the vertices.
+    fn is_cloud(&self) -> bool {
+        let refers = |element: &Element| element.name != "vertex" && self.is_read(element);
+        let mut elements = self.header.elements.iter();
+        !elements.any(|element| refers(element) && element.count > 0)
     }
 
     /// All elements, row by row.
@@ -145,6 +162,9 @@ impl<'h> Reader<'h> {
             return Err(Fault::whole("holds no vertices"));
         }
         self.warn_of_ignored(warnings);
+        if self.layout.classes {
+            self.mesh.classes = cloud::classes(&self.classes, warnings);
+        }
         if self.faces.is_empty() {
             self.mesh.triangles = self.triangles;
         } else {
@@ -177,17 +197,7 @@ impl<'h> Reader<'h> {
                     .map(|(_, p)| format!("{}.{}", element.name, p.name)),
             );
         }
-        const SHOWN: usize = 12;
-        if !names.is_empty() {
-            let more = if names.len() > SHOWN { ", ..." } else { "" };
-            let list = names[..names.len().min(SHOWN)].join(", ");
-            warnings.push(Warning::new(
-                "ignored-properties",
-                format!("properties that are not read: {list}{more}"),
-                names.len() as u64,
-                None,
-            ));
-        }
+        cloud::warn_of_ignored(&names, warnings);
     }
 }
 

@@ -1,17 +1,31 @@
-//! The vertex element: positions, normals and colours.
+//! The vertex element: positions, normals, colours and classes.
 
 use super::header::{Element, Property, Scalar, Shape};
 use super::rows::{Binary, Rows, decode, skip_property};
 use super::{Reader, TASK};
 use crate::error::Fault;
+use crate::io::cloud::SKIP;
 use crate::numeric::vector::Vec3;
 use rayon::prelude::*;
 
 /// The properties of a vertex that are read; their places here are the slots of a row.
-const NAMES: [&str; 10] = [
-    "x", "y", "z", "nx", "ny", "nz", "red", "green", "blue", "alpha",
+const NAMES: [&str; 11] = [
+    "x",
+    "y",
+    "z",
+    "nx",
+    "ny",
+    "nz",
+    "red",
+    "green",
+    "blue",
+    "alpha",
+    "classification",
 ];
 const ALPHA: usize = 9;
+const CLASS: usize = 10;
+/// What else classes are called, the last by CloudCompare.
+const CLASSES: [&str; 3] = ["class", "Classification", "scalar_Classification"];
 
 /// Which property of the vertex element is what.
 #[derive(Debug)]
@@ -22,6 +36,7 @@ pub struct Layout {
     divisors: [f64; NAMES.len()],
     normals: bool,
     colors: bool,
+    pub classes: bool,
 }
 
 impl Layout {
@@ -29,6 +44,11 @@ impl Layout {
     pub fn new(element: &Element) -> Result<Layout, Fault> {
         let slot = |p: &Property| {
             let name = p.name.strip_prefix("diffuse_").unwrap_or(&p.name);
+            let name = if CLASSES.contains(&name) {
+                NAMES[CLASS]
+            } else {
+                name
+            };
             let slot = NAMES.iter().position(|s| *s == name)?;
             matches!(p.shape, Shape::Scalar(_)).then_some(slot)
         };
@@ -46,18 +66,19 @@ impl Layout {
                 format!("the vertex element has no property {}", NAMES[missing]),
             ));
         }
-        let (normals, colors) = ((3..6).all(has), (6..ALPHA).all(has));
+        let (normals, colors, classes) = ((3..6).all(has), (6..ALPHA).all(has), has(CLASS));
         let is_read = |slot: usize| match slot {
             0..3 => true,
             3..6 => normals,
-            _ => colors,
+            6..=ALPHA => colors,
+            _ => true,
         };
         for slot in &mut slots {
             *slot = slot.filter(|slot| is_read(*slot));
         }
         let mut divisors = [1.0; NAMES.len()];
         for (property, slot) in element.properties.iter().zip(&slots) {
-            if let (Shape::Scalar(scalar), Some(slot @ 6..)) = (property.shape, slot) {
+            if let (Shape::Scalar(scalar), Some(slot @ 6..=ALPHA)) = (property.shape, slot) {
                 divisors[*slot] = match scalar {
                     Scalar::F32 | Scalar::F64 => 1.0,
                     Scalar::U16 | Scalar::I16 => 65535.0,
@@ -70,6 +91,7 @@ impl Layout {
             divisors,
             normals,
             colors,
+            classes,
         })
     }
 
@@ -110,7 +132,10 @@ impl Reader<'_> {
         let room = rows.most(element);
         let room = usize::try_from(element.count).map_or(room, |count| count.min(room));
         let Layout {
-            normals, colors, ..
+            normals,
+            colors,
+            classes,
+            ..
         } = self.layout;
         self.mesh.positions.reserve_exact(room);
         let mut all_normals = Vec::with_capacity(if normals { room } else { 0 });
@@ -126,9 +151,15 @@ impl Reader<'_> {
                 }
             }
             rows.end();
-            if let Some(slot) = values.iter().position(|v| !v.is_finite()) {
+            if let Some(slot) = values.iter().position(|v| !v.is_finite())
+                && !self.keeps_bad
+            {
                 let (name, value) = (NAMES[slot], values[slot]);
-                return Err(rows.fault(format!("has {name} = {value}, which is not finite")));
+                let fault = rows.fault(format!("has {name} = {value}, which is not finite"));
+                return Err(match self.is_cloud() {
+                    true => fault.with_hint(SKIP),
+                    false => fault,
+                });
             }
             let [x, y, z, nx, ny, nz, ..] = values;
             self.mesh.positions.push([x, y, z]);
@@ -137,6 +168,9 @@ impl Reader<'_> {
             }
             if colors {
                 all_colors.push([6, 7, 8, 9].map(|s| (values[s] / self.layout.divisors[s]) as f32));
+            }
+            if classes {
+                self.classes.push(values[CLASS]);
             }
         }
         check_count(element)?;
@@ -183,6 +217,9 @@ impl Reader<'_> {
             let channel = |row: &[u8], slot: usize| (value(row, slot) / divisors[slot]) as f32;
             let color = |row: &[u8]| [6, 7, 8, 9].map(|slot| channel(row, slot));
             self.mesh.colors = Some(vertices().map(color).collect());
+        }
+        if self.layout.classes {
+            self.classes = vertices().map(|row| value(row, CLASS)).collect();
         }
         Ok(true)
     }

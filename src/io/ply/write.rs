@@ -1,5 +1,6 @@
 //! Writing: binary, little endian.
 
+use crate::io::cloud::{is_of_bytes, to_byte};
 use crate::mesh::Mesh;
 use crate::numeric::vector::Vec3;
 use std::io::{self, Write};
@@ -7,7 +8,7 @@ use std::io::{self, Write};
 /// Bytes gathered before they are written.
 const BUFFER: usize = 1 << 16;
 
-/// Writes binary little-endian PLY: positions, normals and colours; faces as stored, segments as
+/// Writes binary little-endian PLY: positions, normals, colours and classes; faces as stored, segments as
 /// edges, and points where vertices alone would not say it.
 ///
 /// Coordinates and normals are 32-bit numbers where all of them are exactly that, else 64-bit
@@ -27,6 +28,9 @@ pub fn write(mesh: &Mesh, out: &mut dyn Write) -> io::Result<()> {
         }
         if let Some(colors) = &mesh.colors {
             out.color(&colors[v][..plan.channels], plan.bytes);
+        }
+        if let Some(classes) = &mesh.classes {
+            out.bytes.push(classes[v]);
         }
         out.spill()?;
     }
@@ -74,10 +78,7 @@ impl Plan {
         Plan {
             wide_positions: is_wide(&mesh.positions),
             wide_normals: is_wide(mesh.normals.as_deref().unwrap_or_default()),
-            bytes: colors
-                .as_flattened()
-                .iter()
-                .all(|c| from_byte(to_byte(*c)).to_bits() == c.to_bits()),
+            bytes: is_of_bytes(colors.as_flattened()),
             channels: if colors.iter().all(|c| c[3] == 1.0) {
                 3
             } else {
@@ -110,6 +111,9 @@ impl Plan {
             let kind = if self.bytes { "uchar" } else { "float" };
             let names = ["red", "green", "blue", "alpha"];
             add(kind, &names[..self.channels]);
+        }
+        if mesh.classes.is_some() {
+            add("uchar", &["classification"]);
         }
         // Indices of 31 bits are written as `int`, which every reader knows.
         let index = if i32::try_from(mesh.positions.len()).is_ok() {
@@ -146,15 +150,6 @@ fn is_wide(vectors: &[Vec3]) -> bool {
         .as_flattened()
         .iter()
         .any(|c| f64::from(*c as f32) != *c)
-}
-
-fn to_byte(channel: f32) -> u8 {
-    (channel * 255.0).round() as u8
-}
-
-/// As the reader makes it.
-fn from_byte(byte: u8) -> f32 {
-    (f64::from(byte) / 255.0) as f32
 }
 
 struct Gathered<'o> {

@@ -147,7 +147,10 @@ fn mesh_format(name: &str) -> Option<Format> {
         true => Path::new(path.file_stem()?).extension()?.to_str()?,
         false => extension,
     };
-    Format::from_extension(extension).filter(|format| format.kind() == Kind::Mesh)
+    // A text beside the frames is more often about them than one of them.
+    let may_be =
+        |format: &Format| format.kind() == Kind::Mesh && !extension.eq_ignore_ascii_case("txt");
+    Format::from_extension(extension).filter(may_be)
 }
 
 /// The files whose numbers follow on each other.
