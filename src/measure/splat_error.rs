@@ -30,21 +30,6 @@ pub struct PictureError {
     pub psnr_db: Option<f64>,
 }
 
-impl PictureError {
-    /// The share of wrong pixels, as the accuracy of a report: name and unit of the measure, and what
-    /// the other picture is.
-    pub fn accuracy(&self, measure: &str, unit: &str, reference: &str) -> Accuracy {
-        Accuracy {
-            measure: measure.to_owned(),
-            unit: unit.to_owned(),
-            bound: None,
-            reached: Some(self.wrong_share),
-            reference: reference.to_owned(),
-            verified: true,
-        }
-    }
-}
-
 /// Compares two pictures as they are stored, in bytes on the sRGB curve.
 ///
 /// What one has more rows of than the other is left out. Cost: linear in the pixels.
@@ -117,6 +102,39 @@ pub struct SurfaceError {
     pub beyond_outline: u64,
     /// Lines of sight near the outline that meet the mesh but no disc.
     pub short_of_outline: u64,
+}
+
+impl SurfaceError {
+    /// Depths, normals and holes, as the accuracy of a report.
+    pub fn accuracy(&self) -> [Accuracy; 3] {
+        let measure = |measure: &str, unit: &str, reached: Option<f64>| Accuracy {
+            measure: measure.to_owned(),
+            unit: unit.to_owned(),
+            bound: None,
+            reached,
+            reference: "the mesh on the same lines of sight".to_owned(),
+            verified: reached.is_some(),
+        };
+        let holes = (self.inside > 0).then_some(self.hole_share);
+        let diagonal = "share of the diagonal";
+        [
+            measure(
+                "rms difference in depth",
+                diagonal,
+                self.depth.map(|d| d.rms),
+            ),
+            measure(
+                "rms difference of normals",
+                "degree",
+                self.normal_deg.map(|n| n.rms),
+            ),
+            measure(
+                "holes",
+                "share of the lines of sight inside the outline",
+                holes,
+            ),
+        ]
+    }
 }
 
 /// What a mesh shows on a line of sight: the way, and the normal towards the viewer.

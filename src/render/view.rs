@@ -8,6 +8,9 @@ use crate::spatial::local::{exponent_above, times_power_of_two};
 use schemars::JsonSchema;
 use serde::Serialize;
 
+/// Most pixels along a side of a picture.
+pub const MOST_PIXELS: u32 = 16_384;
+
 /// Where a picture is taken from.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
 pub struct View {

@@ -365,11 +365,7 @@ fn vertex_index(what: &str, word: &[u8], place: Place) -> Result<(u32, bool), Fa
     Ok((index as u32, index >= i128::from(place.so_far)))
 }
 
-fn merge(
-    parts: &[Part],
-    has_normals: bool,
-    warnings: &mut Vec<Warning>,
-) -> Result<Mesh, Fault> {
+fn merge(parts: &[Part], has_normals: bool, warnings: &mut Vec<Warning>) -> Result<Mesh, Fault> {
     let mut faces = Polygons::default();
     let corners = parts.iter().map(|p| p.faces.corners.len()).sum();
     let count: usize = parts.iter().map(|p| p.faces.len()).sum();

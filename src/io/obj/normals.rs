@@ -16,9 +16,8 @@ pub fn of_cloud(
     starts: &[(u64, u64)],
     parts: &[Part],
 ) -> Result<Option<Vec<Vec3>>, Fault> {
-    let is_bare = |part: &Part| {
-        part.faces.is_empty() && part.segments.is_empty() && part.points.is_empty()
-    };
+    let is_bare =
+        |part: &Part| part.faces.is_empty() && part.segments.is_empty() && part.points.is_empty();
     let vertices: u64 = parts.iter().map(|part| part.positions.len() as u64).sum();
     let normals: u64 = parts.iter().map(|part| part.notes.normals.count()).sum();
     if normals != vertices || !parts.iter().all(is_bare) {

@@ -149,7 +149,10 @@ fn as_many_normals_as_points_are_theirs() {
     assert!(mesh.is_cloud() && warnings.is_empty());
     for text in ["vn 0 0 1\nv 1 2 3\nv 4 5 6\n", "vn 0 0 1\nv 1 2 3\np 1\n"] {
         let (mesh, warnings) = read_text(text).unwrap();
-        assert_eq!((mesh.normals, &*warnings[0].code), (None, "ignored-normals"));
+        assert_eq!(
+            (mesh.normals, &*warnings[0].code),
+            (None, "ignored-normals")
+        );
     }
     let said = read_text("v 1 2 3\nvn 0 1\n").unwrap_err().to_string();
     assert_eq!(said, "2: normal has 2 numbers, but 3 are needed");

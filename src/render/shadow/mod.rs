@@ -16,9 +16,9 @@ mod picture;
 mod stats;
 mod trade;
 
-pub use super::view::{Shot, View};
+pub use super::view::{MOST_PIXELS, Shot, View};
 pub use cast::NEAR_LEAST;
-pub use params::{Light, MOST_PIXELS, MOST_RAYS, Method, Near, Params, REFERENCE_RAYS};
+pub use params::{Light, MOST_RAYS, Method, Near, Params, REFERENCE_RAYS};
 pub use stats::{Stats, Verified};
 pub use trade::TRADE;
 

@@ -1,7 +1,7 @@
 //! What is asked for.
 
 use crate::error::{Error, Result};
-use crate::render::view::{TOO_FAR, View};
+use crate::render::view::{MOST_PIXELS, TOO_FAR, View};
 use crate::trade::named;
 use crate::volume::voxelize::{self, Mode, Storage};
 use schemars::JsonSchema;
@@ -70,9 +70,6 @@ pub struct Params {
     /// Bytes that the voxels may take.
     pub max_memory: u64,
 }
-
-/// Most pixels along a side of a picture.
-pub const MOST_PIXELS: u32 = 16_384;
 
 /// Most rays for a pixel and a light.
 pub const MOST_RAYS: u32 = 1 << 20;

@@ -26,8 +26,7 @@ mod trade;
 mod tree;
 
 pub use params::{
-    Accelerator, Blend, Ground, Light, MOST_DEPTH, MOST_PIXELS, MOST_SAMPLES, Material, Params,
-    SelfHit,
+    Accelerator, Blend, Ground, Light, MOST_DEPTH, MOST_SAMPLES, Material, Params, SelfHit,
 };
 pub use scene::{Scene, Sphere};
 pub use stats::{BvhStats, Checked, OctreeStats, Stats};
@@ -59,8 +58,8 @@ const CHECK_RAYS: u64 = 1 << 14;
 pub struct Drawing {
     /// The light of each pixel.
     pub light: Raster,
-    /// What is seen in the middle of each pixel, row by row; only where the scene has a reference, or
-    /// [`Params::maps`] asks for it.
+    /// What is seen in the middle of each pixel, row by row; only where the scene has a
+    /// reference.
     pub looks: Vec<Look>,
     /// The same picture of the scene's reference, or else with [`Params::verify`] of the finest
     /// setting.
@@ -105,7 +104,7 @@ pub fn draw(scene: &Scene, params: &Params, progress: &dyn Progress) -> Result<(
         progress.stage("check", 0);
         stats.checked = Some(checked(&stage, params));
     }
-    let looks = if stage.reference.is_some() || params.maps {
+    let looks = if stage.reference.is_some() {
         progress.stage("look", 0);
         Eye::new(&stage, params).middles(look)
     } else {

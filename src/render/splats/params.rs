@@ -2,7 +2,7 @@
 
 use crate::error::{Error, Result, number};
 use crate::image::colour::{Srgb, WHITE};
-use crate::render::view::{TOO_FAR, View};
+use crate::render::view::{MOST_PIXELS, TOO_FAR, View};
 use crate::trade::named;
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -242,12 +242,7 @@ pub struct Params {
     pub seed: u64,
     /// Whether the tree is checked against every disc, and the picture against the finest setting.
     pub verify: bool,
-    /// Whether [`super::Drawing::looks`] are wanted.
-    pub maps: bool,
 }
-
-/// Most pixels along a side of a picture.
-pub const MOST_PIXELS: u32 = 16_384;
 
 /// Most bounces of a ray.
 pub const MOST_DEPTH: u32 = 64;
@@ -275,7 +270,6 @@ impl Params {
         size: [1024, 768],
         seed: 0,
         verify: false,
-        maps: false,
     };
 
     /// The same picture as exact as discs make it: what [`Params::verify`] compares with.

@@ -54,9 +54,9 @@ fn ball_of(count: f64, delta: f64) -> Splats {
 fn heap(count: u64) -> Splats {
     let vector = |rng: &mut Rng| std::array::from_fn(|_| rng.range(-1.0, 1.0));
     let disc = |i: u64| {
-        let mut rng = Rng::new(7, if i % 17 == 0 { i / 2 } else { i });
+        let mut rng = Rng::new(7, if i.is_multiple_of(17) { i / 2 } else { i });
         let mut normal: Vec3 = normalize(vector(&mut rng));
-        if i % 5 == 0 {
+        if i.is_multiple_of(5) {
             // Along an axis: boxes without thickness, planes that rays lie in.
             normal = [0.0; 3];
             normal[(i / 5 % 3) as usize] = 1.0;
@@ -66,7 +66,7 @@ fn heap(count: u64) -> Splats {
             centre: vector(&mut rng),
             normal,
             tangent: super::disc::across(normal),
-            radius: if i % 50 == 0 { 0.0 } else { radius },
+            radius: if i.is_multiple_of(50) { 0.0 } else { radius },
             field: normal,
             slopes: [rng.unit(), -rng.unit()],
             error: 0.01 * radius,
@@ -118,7 +118,7 @@ fn any_ray(i: u64, discs: &Discs) -> Ray {
             let sign = direction[axis].signum();
             direction = [0.0; 3];
             direction[axis] = sign;
-            if i % 8 == 0 {
+            if i.is_multiple_of(8) {
                 // In the planes and through the centres of discs, and along faces of cells.
                 origin = disc.centre;
                 origin[axis] = -0.25;
@@ -664,7 +664,6 @@ fn discs_on_their_rims_and_edges_are_met_or_missed_without_numbers_that_are_none
 fn checking_finds_nothing_and_the_finest_picture_is_there() {
     let params = small(Params {
         verify: true,
-        maps: true,
         ..Params::DEFAULT
     });
     let (drawing, stats) = draw(&scene(), &params, &Silent).expect("a picture");
@@ -673,12 +672,31 @@ fn checking_finds_nothing_and_the_finest_picture_is_there() {
     assert_eq!(stats.accuracy().reached, Some(0.0));
     let exact = drawing.exact.expect("was asked for");
     assert_eq!(exact.width(), 60);
+    assert!(exact != drawing.light && drawing.looks.is_empty());
+}
+
+#[test]
+fn a_reference_is_drawn_in_place_of_the_discs() {
+    let with = |reference| Scene {
+        reference,
+        ..scene()
+    };
+    let sphere = shapes::octasphere([0.0; 3], 1.0, 64);
+    let params = small(Params::DEFAULT);
+    let (drawing, _) = draw(&with(Some(sphere)), &params, &Silent).expect("a picture");
+    let (alone, _) = drawn(&with(None), &params);
+    assert!(drawing.light == alone, "the reference changes the picture");
+    let exact = drawing.exact.expect("there is a reference");
+    assert!(exact != alone);
     assert_eq!(drawing.looks.len(), 60 * 44);
+    assert_eq!(
+        drawing.surface.map(|mesh| mesh.triangles.len()),
+        Some(8 * 64 * 64)
+    );
     let hits = drawing.looks.iter().filter(|look| look.depth.is_finite());
-    assert!(hits.clone().count() > 200);
     // Discs that stand out at the outline show their back.
     let outside = hits.clone().filter(|look| look.outside).count();
-    assert!(outside * 20 > hits.count() * 19, "{outside}");
+    assert!(hits.clone().count() > 200 && outside * 20 > hits.count() * 19);
 }
 
 #[test]
