@@ -5,7 +5,7 @@ use crate::streams::say;
 use crate::trade::{Declared, TABLE};
 use crate::{
     compare, completions, compress_anim, convert, formats, info, isosurface, man, schema, shadow,
-    smooth_mc, splat_gen, stability, tradeoff, tunnels, voxelize,
+    smooth_mc, splat_gen, splat_trace, stability, tradeoff, tunnels, voxelize,
 };
 use clap::error::ErrorKind;
 use clap::{Arg, CommandFactory, FromArgMatches, Parser, Subcommand};
@@ -32,6 +32,7 @@ pub enum Command {
     Isosurface(isosurface::Args),
     Tunnels(Box<tunnels::Args>),
     SplatGen(Box<splat_gen::Args>),
+    SplatTrace(Box<splat_trace::Args>),
     CompressAnim(compress_anim::Args),
     Info(info::Args),
     Compare(compare::Args),
@@ -49,7 +50,7 @@ const GROUPS: &[(&str, &[&str])] = &[
     ("Mesh to volume", &["voxelize"]),
     ("Mesh to picture", &["shadow"]),
     ("Volume to mesh", &["smooth-mc", "isosurface"]),
-    ("Points", &["splat-gen"]),
+    ("Points", &["splat-gen", "splat-trace"]),
     ("Molecules", &["tunnels"]),
     ("Animations", &["compress-anim"]),
     ("Any file", &["info", "convert", "compare"]),

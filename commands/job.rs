@@ -145,6 +145,11 @@ impl<'a> Job<'a> {
         self.read_with(io::read_mesh)
     }
 
+    /// Reads the next input, which must be splats.
+    pub fn read_splats(&mut self) -> Result<Splats> {
+        self.read_with(io::read_splats)
+    }
+
     /// Reads the next input, which must be a volume.
     pub fn read_volume(&mut self) -> Result<Volume> {
         self.read_with(io::read_volume)

@@ -33,6 +33,7 @@ mod schema;
 mod shadow;
 mod smooth_mc;
 mod splat_gen;
+mod splat_trace;
 mod stability;
 mod tradeoff;
 mod tunnels;
@@ -55,6 +56,7 @@ fn run(command: &Command) -> Exit {
         Command::Voxelize(args) => voxelize::run(args),
         Command::Shadow(args) => shadow::run(args),
         Command::SplatGen(args) => splat_gen::run(args),
+        Command::SplatTrace(args) => splat_trace::run(args),
         Command::SmoothMc(args) => smooth_mc::run(args),
         Command::Isosurface(args) => isosurface::run(args),
         Command::Tunnels(args) => tunnels::run(args),

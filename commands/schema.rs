@@ -4,7 +4,7 @@ use crate::exit::Exit;
 use crate::streams::print;
 use crate::{
     compare, compress_anim, convert, formats, info, isosurface, shadow, smooth_mc, splat_gen,
-    stability, tradeoff, tunnels, voxelize, words,
+    splat_trace, stability, tradeoff, tunnels, voxelize, words,
 };
 use clap::builder::PossibleValuesParser;
 use scantle::error::Result;
@@ -42,6 +42,7 @@ const SCHEMAS: &[Row] = &[
     ("shadow", || schema_for!(shadow::Report)),
     ("smooth-mc", || schema_for!(smooth_mc::Report)),
     ("splat-gen", || schema_for!(splat_gen::Report)),
+    ("splat-trace", || schema_for!(splat_trace::Report)),
     ("stability", || schema_for!(stability::Report)),
     ("tradeoff", || schema_for!(tradeoff::Report)),
     ("voxelize", || schema_for!(voxelize::Report)),

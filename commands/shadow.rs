@@ -3,15 +3,13 @@
 use crate::context::{Context, Files};
 use crate::exit::Exit;
 use crate::job::{Found, Job};
-use crate::shared::{Common, Inputs, MaxError, Output, Seed, Verify, list, named};
+use crate::shared::{Common, Inputs, MaxError, Output, Seed, Verify, list, named, picture_size};
 use clap::builder::PossibleValue;
 use clap::{ValueEnum, value_parser};
 use scantle::error::Result;
 use scantle::image::samples::Image;
 use scantle::io::format::Kind;
-use scantle::render::shadow::{
-    self, Light, MOST_PIXELS, MOST_RAYS, Method, Near, Params, Stats, View,
-};
+use scantle::render::shadow::{self, Light, MOST_RAYS, Method, Near, Params, Stats, View};
 use scantle::report::Measures;
 use scantle::volume::voxelize::Mode;
 use schemars::JsonSchema;
@@ -60,7 +58,7 @@ pub struct Args {
     #[arg(long, value_name = "EYE,TARGET,UP,ANGLE", value_parser = list::<10>, allow_hyphen_values = true)]
     camera: Option<[f64; 10]>,
     /// Columns and rows of the picture
-    #[arg(long, value_name = "WxH", default_value = "1024x768", value_parser = size)]
+    #[arg(long, value_name = "WxH", default_value = "1024x768", value_parser = picture_size)]
     size: [u32; 2],
     /// Write the mesh instead of a picture, with the light that each vertex gets as its colour
     #[arg(long, value_enum, conflicts_with_all = ["camera", "size"])]
@@ -100,18 +98,6 @@ impl ValueEnum for Bake {
 
     fn to_possible_value(&self) -> Option<PossibleValue> {
         Some(PossibleValue::new("vertices"))
-    }
-}
-
-/// Two numbers with an `x` between them.
-fn size(text: &str) -> Result<[u32; 2], String> {
-    let side = |word: &str| word.parse().ok().filter(|n| (1..=MOST_PIXELS).contains(n));
-    let sides = text.split_once('x').map(|(w, h)| (side(w), side(h)));
-    match sides {
-        Some((Some(width), Some(height))) => Ok([width, height]),
-        _ => Err(format!(
-            "not two numbers from 1 to {MOST_PIXELS} such as 1024x768"
-        )),
     }
 }
 

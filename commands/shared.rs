@@ -5,6 +5,7 @@
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{Args, value_parser};
 use scantle::io::format::Format;
+use scantle::render::view::MOST_PIXELS;
 
 const IN_AND_OUT: &str = "Input and output";
 const REPORT: &str = "Report";
@@ -187,6 +188,18 @@ pub fn list<const N: usize>(text: &str) -> Result<[f64; N], String> {
     numbers
         .try_into()
         .map_err(|_| format!("has {count} numbers, not {N}"))
+}
+
+/// Columns and rows of a picture: two numbers with an `x` between them.
+pub fn picture_size(text: &str) -> Result<[u32; 2], String> {
+    let side = |word: &str| word.parse().ok().filter(|n| (1..=MOST_PIXELS).contains(n));
+    let sides = text.split_once('x').map(|(w, h)| (side(w), side(h)));
+    match sides {
+        Some((Some(width), Some(height))) => Ok([width, height]),
+        _ => Err(format!(
+            "not two numbers from 1 to {MOST_PIXELS} such as 1024x768"
+        )),
+    }
 }
 
 /// A finite number that is 0 or more.

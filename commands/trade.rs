@@ -3,7 +3,7 @@
 use scantle::anim::compress;
 use scantle::points::splat;
 use scantle::protein::tunnels;
-use scantle::render::shadow;
+use scantle::render::{shadow, splats};
 use scantle::trade::Trade;
 use scantle::volume::{smooth_mc, voxelize};
 
@@ -44,6 +44,7 @@ pub const TABLE: &[(&str, Declared)] = &[
     ("smooth-mc", Declared::Trade(&smooth_mc::TRADE)),
     ("tunnels", Declared::Trade(&tunnels::TRADE)),
     ("splat-gen", Declared::Trade(&splat::TRADE)),
+    ("splat-trace", Declared::Trade(&splats::TRADE)),
     ("compress-anim encode", Declared::Trade(&compress::TRADE)),
     ("compress-anim", Declared::None("its verb `encode` has one")),
     (

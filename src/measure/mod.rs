@@ -10,6 +10,7 @@ pub mod report_difference;
 mod sides;
 pub mod smooth_error;
 pub mod splat_cover;
+pub mod splat_error;
 pub mod stability;
 mod surface;
 #[cfg(test)]

@@ -2,7 +2,8 @@
 //!
 //! A picture is drawn deferred: the z-buffer of [`crate::camera::raster`] says what each of four
 //! samples per pixel shows, then light is worked out per sample. There are no rays and no random
-//! numbers. [`shadow`] traces rays instead, whose ends are drawn by the pixel's index. Either way
+//! numbers. [`shadow`] and [`splats`] trace rays instead, whose random ends are drawn by the pixel's
+//! index. Either way
 //! equal input gives equal bytes on any number of threads.
 
 mod ground;
@@ -11,6 +12,8 @@ mod occlusion;
 pub mod preview;
 pub mod shade;
 pub mod shadow;
+pub mod splats;
+pub mod view;
 
 /// A point or a vector in view space, in the precision of a picture.
 pub(crate) type Vec3f = [f32; 3];

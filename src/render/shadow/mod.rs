@@ -16,12 +16,14 @@ mod picture;
 mod stats;
 mod trade;
 
+pub use super::view::{MOST_PIXELS, Shot, View};
 pub use cast::NEAR_LEAST;
-pub use params::{Light, MOST_PIXELS, MOST_RAYS, Method, Near, Params, REFERENCE_RAYS, View};
-pub use stats::{Shot, Stats, Verified};
+pub use params::{Light, MOST_RAYS, Method, Near, Params, REFERENCE_RAYS};
+pub use stats::{Stats, Verified};
 pub use trade::TRADE;
 
-use crate::camera::{Camera, Lens, Size, THREE_QUARTER};
+use super::view::{Local, is_near, upper_left};
+use crate::camera::{Camera, Size, THREE_QUARTER};
 use crate::error::{Error, Fault, Result};
 use crate::image::raster::Raster;
 use crate::mesh::Mesh;
@@ -30,7 +32,6 @@ use crate::numeric::vector::{Vec3, add, cross, normalize, scale, sub};
 use crate::progress::Progress;
 use crate::report::{Modelled, Warning};
 use crate::spatial::aabb::Aabb;
-use crate::spatial::local::{exponent_above, times_power_of_two};
 use crate::volume::octree::RayTree;
 use crate::volume::voxelize::{self, Lazy, Mode, voxelize};
 use crate::volume::{Data, Volume};
@@ -54,7 +55,11 @@ pub fn draw(mesh: &Mesh, params: &Params, progress: &dyn Progress) -> Result<(Ra
     let caster = model.caster(params, progress)?;
     let (raster, tally) = picture::draw(&model, &caster, params, progress);
     let mut stats = model.stats(params, &caster, tally);
-    stats.camera = Some(params.camera.map_or_else(|| model.shot(), Shot::from));
+    stats.camera = Some(
+        params
+            .camera
+            .map_or_else(|| Shot::of(&model.camera, &model.local), Shot::from),
+    );
     Ok((raster, stats))
 }
 
@@ -92,34 +97,6 @@ pub fn bake(mesh: &Mesh, params: &Params, progress: &dyn Progress) -> Result<(Me
     });
     let stats = model.stats(params, &caster, tally);
     Ok((baked, stats))
-}
-
-/// The way to coordinates in which the model's box starts at 0 and its longest side is from 1/2 to 1.
-///
-/// The difference from the box's corner moves with the model, and scaling by powers of two is exact:
-/// what is left depends on neither place nor size.
-#[derive(Debug, Clone, Copy)]
-struct Local {
-    origin: Vec3,
-    exponent: i32,
-}
-
-impl Local {
-    fn point(&self, p: Vec3) -> Vec3 {
-        sub(p, self.origin).map(|c| times_power_of_two(c, -self.exponent))
-    }
-
-    fn length(&self, length: f64) -> f64 {
-        times_power_of_two(length, -self.exponent)
-    }
-
-    fn point_back(&self, p: Vec3) -> Vec3 {
-        add(p.map(|c| self.length_back(c)), self.origin)
-    }
-
-    fn length_back(&self, length: f64) -> f64 {
-        times_power_of_two(length, self.exponent)
-    }
 }
 
 /// The mesh in local coordinates, its triangles laid out for rays, and its voxels.
@@ -175,13 +152,7 @@ impl Model {
             height: params.size[1] as usize,
         };
         let camera = match params.camera {
-            Some(view) => {
-                let (eye, target) = (local.point(view.eye), local.point(view.target));
-                if !is_near(eye) || !is_near(target) {
-                    return Err(view.too_far());
-                }
-                Camera::look_at(eye, target, up, view.fov_deg.to_radians())
-            }
+            Some(view) => view.camera(&local)?,
             None => picture::framed(&framing, &mesh, &lights, up, size),
         };
         Ok(Model {
@@ -228,30 +199,6 @@ impl Model {
             }
         }
         sums.into_iter().map(normalize).collect()
-    }
-
-    /// The camera of no other, in the mesh's unit.
-    fn shot(&self) -> Shot {
-        let Camera {
-            target,
-            unit,
-            axes,
-            distance,
-            lens,
-        } = self.camera;
-        let (fov_deg, height) = match lens {
-            Lens::Perspective { fov_y } => (Some(fov_y.to_degrees()), None),
-            Lens::Orthographic { height } => (None, Some(self.local.length_back(height * unit))),
-        };
-        Shot {
-            eye: self
-                .local
-                .point_back(add(target, scale(axes[2], distance * unit))),
-            target: self.local.point_back(target),
-            up: axes[1],
-            fov_deg,
-            height,
-        }
     }
 
     fn stats(&self, params: &Params, caster: &Caster, tally: Tally) -> Stats {
@@ -333,14 +280,6 @@ impl Model {
     }
 }
 
-/// Whether products of local coordinates like these stay far from overflow.
-fn is_near(p: Vec3) -> bool {
-    p.iter().all(|c| c.abs() < FARTHEST)
-}
-
-/// Lights and cameras may be this far from the model, in its own lengths.
-const FARTHEST: f64 = 1e100;
-
 /// The triangles of a mesh in local coordinates.
 fn localized(mesh: &Mesh) -> Result<(Local, Mesh)> {
     let mut used = vec![false; mesh.positions.len()];
@@ -349,21 +288,7 @@ fn localized(mesh: &Mesh) -> Result<(Local, Mesh)> {
     }
     let of_triangles = mesh.positions.iter().zip(&used);
     let bounds = Aabb::around(of_triangles.filter(|(_, used)| **used).map(|(p, _)| p));
-    let longest = bounds.extent().into_iter().fold(0.0, f64::max);
-    if !longest.is_finite() {
-        return Err(Error::Geometry(Fault::whole(format!(
-            "the model spans {:?} to {:?}: its extent overflows",
-            bounds.lo, bounds.hi
-        ))));
-    }
-    let local = Local {
-        origin: bounds.lo,
-        exponent: if longest > 0.0 {
-            exponent_above(longest)
-        } else {
-            0
-        },
-    };
+    let local = Local::around(bounds)?;
     let first = mesh
         .triangles
         .first()
@@ -376,12 +301,9 @@ fn localized(mesh: &Mesh) -> Result<(Local, Mesh)> {
 
 /// The light of no other: to the upper left of the viewer, four radii of the model away.
 fn default_light(framing: &Camera, bounds: Aabb, up: Vec3) -> Light {
-    let right = normalize(cross(up, framing.axes[2]));
-    let front = cross(right, up);
-    let away = add(up, add(scale(right, -0.5), scale(front, 0.3)));
     let way = 4.0 * framing.unit;
     Light {
-        centre: add(bounds.centre(), scale(normalize(away), way)),
+        centre: add(bounds.centre(), scale(upper_left(framing, up), way)),
         radius: 0.16 * way,
     }
 }

@@ -1,7 +1,7 @@
 //! What is asked for.
 
 use crate::error::{Error, Result};
-use crate::numeric::vector::{cross, length, normalize, sub};
+use crate::render::view::{MOST_PIXELS, TOO_FAR, View};
 use crate::trade::named;
 use crate::volume::voxelize::{self, Mode, Storage};
 use schemars::JsonSchema;
@@ -42,19 +42,6 @@ pub struct Light {
     pub radius: f64,
 }
 
-/// Where a picture is taken from.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
-pub struct View {
-    /// Where the viewer is, in the mesh's unit.
-    pub eye: [f64; 3],
-    /// The point in the middle of the picture.
-    pub target: [f64; 3],
-    /// The direction that is up in the picture, and across the ground.
-    pub up: [f64; 3],
-    /// Angle from the bottom of the picture to its top, in degrees.
-    pub fov_deg: f64,
-}
-
 /// What [`super::draw`] and [`super::bake`] are asked for.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Params {
@@ -83,9 +70,6 @@ pub struct Params {
     /// Bytes that the voxels may take.
     pub max_memory: u64,
 }
-
-/// Most pixels along a side of a picture.
-pub const MOST_PIXELS: u32 = 16_384;
 
 /// Most rays for a pixel and a light.
 pub const MOST_RAYS: u32 = 1 << 20;
@@ -160,9 +144,6 @@ impl Params {
     }
 }
 
-/// What is said of places that coordinates of the model's size cannot reach.
-const TOO_FAR: &str = "is over 1e100 times the model's size away from it";
-
 impl Light {
     fn wrong(&self, problem: &str) -> Error {
         let [x, y, z] = self.centre;
@@ -181,44 +162,6 @@ impl Light {
         }
         if self.radius < 0.0 {
             return wrong("the radius is negative");
-        }
-        Ok(())
-    }
-}
-
-impl View {
-    fn wrong(&self, problem: &str) -> Error {
-        let numbers = [self.eye, self.target, self.up].concat();
-        let mut words: Vec<String> = numbers.iter().map(|v| format!("{v:?}")).collect();
-        words.push(format!("{:?}", self.fov_deg));
-        Error::parameter("camera", words.join(","), problem)
-    }
-
-    pub(super) fn too_far(&self) -> Error {
-        self.wrong(TOO_FAR)
-    }
-
-    fn check(&self) -> Result<()> {
-        let all = [self.eye, self.target, self.up].concat();
-        let wrong = |problem: &str| Err(self.wrong(problem));
-        if !all.iter().all(|v| v.is_finite()) || !self.fov_deg.is_finite() {
-            return wrong("has a number that is not finite");
-        }
-        let back = sub(self.eye, self.target);
-        if length(back) == 0.0 {
-            return wrong("the eye is the target, so there is no direction to look in");
-        }
-        if !length(back).is_finite() {
-            return wrong("the distance from the eye to the target overflows");
-        }
-        if length(self.up) == 0.0 {
-            return wrong("up has no length");
-        }
-        if length(cross(normalize(self.up), normalize(back))) < 1e-6 {
-            return wrong("up is parallel to the direction of view");
-        }
-        if !(0.1..=170.0).contains(&self.fov_deg) {
-            return wrong("the angle of view is not from 0.1 to 170 degrees");
         }
         Ok(())
     }

@@ -2,7 +2,7 @@
 
 use super::cast::{Caster, Rays, Start, Tally};
 use super::{Light, Model, Params};
-use crate::camera::{Camera, Lens, Size};
+use crate::camera::{Camera, Size};
 use crate::image::colour::{CLAY, Linear, to_linear};
 use crate::image::raster::Raster;
 use crate::mesh::Mesh;
@@ -10,7 +10,7 @@ use crate::mesh::tracer::Ray;
 use crate::numeric::vector::{Vec3, add, cross, dot, length, normalize, scale, sub};
 use crate::progress::Progress;
 use crate::render::shade::{BOUNCE, KEY, SKY, shoulder};
-use crate::render::smoothstep;
+use crate::render::{smoothstep, view};
 use rayon::prelude::*;
 
 /// How dark a shadow on the ground is.
@@ -191,17 +191,10 @@ impl Painter<'_> {
 
     /// The line of sight through a place of the screen.
     fn sight(&self, x: f64, y: f64) -> Ray {
-        let camera = &self.model.camera;
-        let from = camera.from_screen(x, y, 0.0, self.fine);
-        let to = camera.from_screen(x, y, camera.distance, self.fine);
-        let world = |v: Vec3| scale(camera.turn_back(v), camera.unit);
-        let near = match camera.lens {
-            Lens::Orthographic { .. } => 0.0,
-            Lens::Perspective { .. } => camera.near().unwrap_or(0.0) / camera.distance,
-        };
+        let (origin, direction, near) = view::sight(&self.model.camera, x, y, self.fine);
         Ray {
-            origin: add(camera.target, world(from)),
-            direction: world(sub(to, from)),
+            origin,
+            direction,
             reach: [near, f64::INFINITY],
         }
     }

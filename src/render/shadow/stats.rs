@@ -1,7 +1,7 @@
 //! What was drawn, and how exact it is.
 
 use super::cast::Tally;
-use super::{Light, Method, REFERENCE_RAYS, View, trade};
+use super::{Light, Method, REFERENCE_RAYS, Shot, trade};
 use crate::report::{Accuracy, Modelled, Warning};
 use crate::volume::trace::Visits;
 use schemars::JsonSchema;
@@ -20,33 +20,6 @@ pub struct Voxels {
     pub nodes_visited: u64,
     /// Voxels whose bit rays looked at.
     pub voxels_visited: u64,
-}
-
-/// Where a picture was taken from, in the mesh's unit.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
-pub struct Shot {
-    /// Where the viewer was.
-    pub eye: [f64; 3],
-    /// The point in the middle of the picture.
-    pub target: [f64; 3],
-    /// The direction that is up in the picture.
-    pub up: [f64; 3],
-    /// Angle from the bottom of the picture to its top, in degrees; null for parallel lines of sight.
-    pub fov_deg: Option<f64>,
-    /// Height of what is seen with parallel lines of sight; null for others.
-    pub height: Option<f64>,
-}
-
-impl From<View> for Shot {
-    fn from(view: View) -> Self {
-        Shot {
-            eye: view.eye,
-            target: view.target,
-            up: view.up,
-            fov_deg: Some(view.fov_deg),
-            height: None,
-        }
-    }
 }
 
 /// How shadows differ from those of exact rays.
