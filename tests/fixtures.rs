@@ -12,7 +12,7 @@ use scantle::io::{
 };
 use scantle::mesh::{Mesh, shapes};
 use scantle::numeric::vector::{add, cross, dot, length, normalize, scale, sub};
-use scantle::points::{Splat, Splats};
+use scantle::points::{Splat, Splats, splat};
 use scantle::progress::Silent;
 use scantle::protein::builder::{Builder, Place};
 use scantle::protein::{Atom, Element, Molecule, Name};
@@ -55,6 +55,15 @@ const CLOUDS: &[Row<Mesh>] = &[
     ("clouds/hills.ply", hills),
     ("clouds/hills.pcd", hills),
     ("clouds/hills.csv", hills),
+    ("clouds/ball.xyz", || points_of_a_ball(3)),
+    ("clouds/line.xyz", || cloud((0..9).map(|i| [f64::from(i), 2.0 * f64::from(i), 0.5]))),
+    ("clouds/plane.xyz", || {
+        let lattice = (0..400).map(|i| [f64::from(i % 20), f64::from(i / 20), 3.0]);
+        cloud(lattice)
+    }),
+    ("clouds/same.xyz", || cloud((0..5).map(|_| [1.0, 2.0, 3.0]))),
+    ("clouds/two.xyz", || cloud((0..2).map(|i| [f64::from(i), 0.0, 0.0]))),
+    ("clouds/flipped.ply", flipped),
     ("clouds/hills.xyz", || Mesh {
         classes: None,
         ..hills()
@@ -69,7 +78,10 @@ const CLOUDS: &[Row<Mesh>] = &[
     }),
 ];
 
-const SPLATS: &[Row<Splats>] = &[("clouds/splats.ply", splats_of_hills)];
+const SPLATS: &[Row<Splats>] = &[
+    ("clouds/splats.ply", splats_of_hills),
+    ("splats/sphere.ply", splats_of_a_ball),
+];
 
 const VOLUMES: &[Row<Volume>] = &[
     ("volumes/ball.nrrd", || ball(16)),
@@ -353,6 +365,50 @@ fn hills() -> Mesh {
         ),
         ..Mesh::default()
     }
+}
+
+/// Points alone.
+fn cloud(positions: impl Iterator<Item = [f64; 3]>) -> Mesh {
+    let positions: Vec<_> = positions.collect();
+    Mesh {
+        points: (0..positions.len() as u32).collect(),
+        positions,
+        ..Mesh::default()
+    }
+}
+
+/// Points on the unit sphere, in thousandths.
+fn points_of_a_ball(level: u32) -> Mesh {
+    let sphere = shapes::icosphere([0.0; 3], 1.0, level);
+    let rounded = |p: &[f64; 3]| p.map(|x| (x * 1000.0).round() / 1000.0);
+    cloud(sphere.positions.iter().map(rounded))
+}
+
+/// The same with normals, every other of which points inwards.
+fn flipped() -> Mesh {
+    let ball = points_of_a_ball(2);
+    let normal = |(i, p): (usize, &[f64; 3])| {
+        let sign = if i % 2 == 0 { 1.0 } else { -1.0 };
+        scale(normalize(*p), sign)
+    };
+    Mesh {
+        normals: Some(ball.positions.iter().enumerate().map(normal).collect()),
+        ..ball
+    }
+}
+
+/// Discs over points on the unit sphere.
+fn splats_of_a_ball() -> Splats {
+    let params = splat::Params {
+        delta: splat::Length::Absolute(0.05),
+        ..splat::Params::DEFAULT
+    };
+    let ball = shapes::icosphere([0.0; 3], 1.0, 4);
+    let points = Mesh {
+        normals: Some(ball.positions.iter().map(|p| normalize(*p)).collect()),
+        ..cloud(ball.positions.into_iter())
+    };
+    splat::generate(&points, &params, &Silent).expect("points of a ball").0
 }
 
 /// A disc for every fourth point of [`hills`], of radius 1.5.
