@@ -162,29 +162,41 @@ fn spacing(points: &[Vec3], i: usize, row: &[u32], rank: usize) -> f64 {
     (square * std::f64::consts::PI / rank as f64).sqrt()
 }
 
-/// The share of neighbours whose normal points the other way, over all points.
+/// The share of neighbours whose normal points the other way without a reason in the shape.
 ///
-/// Neighbours across an edge do so by the shape alone: two normals agree as well where one is the
-/// other's mirror image in the plane between the points. Cost: one pass over the neighbours.
+/// Two normals agree as well where one is the other's mirror image in the plane between the points: on
+/// both sides of an edge. And they may differ where each point is behind the other, or before it: on the
+/// sides of a thin sheet, or of a slit; but not both of it about one point, which is noise. Cost: one
+/// pass over the neighbours.
 pub fn disagreement(points: &[Vec3], normals: &[Vec3], near: &Neighbourhoods) -> f64 {
-    let counts: (u64, u64) = (0..points.len())
+    let most = near.count.min(DENSITY_RANK);
+    let differ: u64 = (0..points.len())
         .into_par_iter()
         .with_min_len(1024)
-        .map(|i| {
-            let row = &near.row(i)[..near.count.min(DENSITY_RANK)];
-            let differ = row.iter().filter(|j| {
-                let j = **j as usize;
-                let plain = dot(normals[i], normals[j]);
-                plain < 0.0 && mirrored(points, normals, i, j) < 0.0
-            });
-            (differ.count() as u64, row.len() as u64)
-        })
-        .reduce(|| (0, 0), |a, b| (a.0 + b.0, a.1 + b.1));
-    if counts.1 == 0 {
-        0.0
-    } else {
-        counts.0 as f64 / counts.1 as f64
+        .map(|i| differing(points, normals, i, &near.row(i)[..most]))
+        .sum();
+    differ as f64 / ((points.len() * most).max(1)) as f64
+}
+
+/// How many of a point's neighbours have their normal on the wrong side.
+fn differing(points: &[Vec3], normals: &[Vec3], i: usize, row: &[u32]) -> u64 {
+    let (mut behind, mut before, mut other) = (0, 0, 0);
+    for &j in row {
+        let j = j as usize;
+        if dot(normals[i], normals[j]) >= 0.0 || mirrored(points, normals, i, j) >= 0.0 {
+            continue;
+        }
+        let way = sub(points[j], points[i]);
+        let (own, its) = (dot(way, normals[i]), -dot(way, normals[j]));
+        if own < 0.0 && its < 0.0 {
+            behind += 1;
+        } else if own > 0.0 && its > 0.0 {
+            before += 1;
+        } else {
+            other += 1;
+        }
     }
+    other + 2 * behind.min(before)
 }
 
 /// The cosine between one normal and the mirror image of another in the plane between their points.

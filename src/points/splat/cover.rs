@@ -8,8 +8,6 @@ use crate::progress::Progress;
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
-/// A greedy cover chooses among the discs that this share of the density leaves.
-const CANDIDATES: f64 = 0.5;
 /// The natural neighbours of a point are within so many spacings, as a rule.
 const RING: f64 = 1.5;
 /// Points done between two words of progress.
@@ -137,7 +135,7 @@ fn greedy(
             served(cloud, growth, bounds, perc, |_| gain += 1);
             heap.push((gain, Reverse(rank), growth.source));
             rank += 1;
-            settle(cloud, growth, bounds, CANDIDATES * perc, done);
+            settle(cloud, growth, bounds, perc, done);
         },
     );
     progress.stage("grow", u64::from(rank));

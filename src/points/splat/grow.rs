@@ -129,10 +129,11 @@ impl Growth {
             let (forced, more) = self.first_ring(cloud, &row);
             let within = 0.5 * (self.high - self.low) <= bounds.delta;
             if more && within && !self.rest(cloud, &row[forced..], bounds) {
-                let last = row.last().map(|j| Neighbour {
-                    distance_squared: distance_squared(cloud.points[i], cloud.points[*j as usize]),
-                    index: *j,
-                });
+                let last = row.last().map_or(i, |j| *j as usize);
+                let last = Neighbour {
+                    distance_squared: distance_squared(cloud.points[i], cloud.points[last]),
+                    index: last as u32,
+                };
                 self.shells(cloud, last, bounds);
             }
             self.wide = row;
@@ -246,16 +247,19 @@ impl Growth {
     }
 
     /// Covers points beyond the last one known, shell by shell.
-    fn shells(&mut self, cloud: &Cloud, mut last: Option<Neighbour>, bounds: &Bounds) {
+    fn shells(&mut self, cloud: &Cloud, mut last: Neighbour, bounds: &Bounds) {
         let centre = cloud.points[self.source as usize];
-        let first = last.map_or(0.0, |n| n.distance_squared);
-        let first = first.max(self.spacing * self.spacing);
+        let first = last.distance_squared;
+        // Above 0 in any case, so that it grows.
+        let first = first
+            .max(self.spacing * self.spacing)
+            .max(f64::MIN_POSITIVE);
         let guess = GUESS * self.guess;
         let next = |reach: f64| guess.clamp(SHELL[0] * reach, SHELL[1] * reach);
         let mut reach = next(first);
         let mut shell = std::mem::take(&mut self.shell);
         loop {
-            cloud.tree.within(centre, reach, last, &mut shell);
+            cloud.tree.within(centre, reach, Some(last), &mut shell);
             let ended = if shell.is_empty() {
                 // Nothing up to there: the next point, if any, is across a gap.
                 reach.sqrt() > self.last + GAP * self.spacing
@@ -266,7 +270,7 @@ impl Growth {
                 break;
             }
             let farthest = shell.iter().max_by(|a, b| a.order(b));
-            last = farthest.copied().or(last);
+            last = farthest.copied().unwrap_or(last);
             reach = next(reach);
         }
         self.shell = shell;

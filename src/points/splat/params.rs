@@ -100,7 +100,7 @@ impl Order {
 pub enum Cover {
     /// One from each point that none before it covers near its centre, as in the paper.
     Paper,
-    /// Of twice as many, always the one that covers most of what is left.
+    /// Of those, always the one that serves most of what is left.
     Greedy,
 }
 named! { Cover { Paper = "paper", Greedy = "greedy" } }

@@ -150,7 +150,8 @@ fn greedy_covers_with_far_fewer_discs() {
 
 #[test]
 fn a_plane_has_a_few_flat_discs_as_large_as_may_be() {
-    let cloud = square(100_000);
+    // As many discs cover any number of points.
+    let cloud = square(20_000);
     let params = Params {
         cover: Cover::Greedy,
         ..Params::DEFAULT
@@ -346,7 +347,7 @@ fn flipped_normals_are_turned_unless_trusted() {
 #[test]
 fn work_grows_with_the_points_alone() {
     let work = |count| {
-        let (_, stats) = made(&sphere(count, 8), &within(0.02));
+        let (_, stats) = made(&sphere(count, 8), &within(0.1));
         stats.covered_mean * stats.splats as f64
     };
     let ratio = work(32_000) / work(8000);
