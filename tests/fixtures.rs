@@ -56,13 +56,17 @@ const CLOUDS: &[Row<Mesh>] = &[
     ("clouds/hills.pcd", hills),
     ("clouds/hills.csv", hills),
     ("clouds/ball.xyz", || points_of_a_ball(3)),
-    ("clouds/line.xyz", || cloud((0..9).map(|i| [f64::from(i), 2.0 * f64::from(i), 0.5]))),
+    ("clouds/line.xyz", || {
+        cloud((0..9).map(|i| [f64::from(i), 2.0 * f64::from(i), 0.5]))
+    }),
     ("clouds/plane.xyz", || {
         let lattice = (0..400).map(|i| [f64::from(i % 20), f64::from(i / 20), 3.0]);
         cloud(lattice)
     }),
     ("clouds/same.xyz", || cloud((0..5).map(|_| [1.0, 2.0, 3.0]))),
-    ("clouds/two.xyz", || cloud((0..2).map(|i| [f64::from(i), 0.0, 0.0]))),
+    ("clouds/two.xyz", || {
+        cloud((0..2).map(|i| [f64::from(i), 0.0, 0.0]))
+    }),
     ("clouds/flipped.ply", flipped),
     ("clouds/hills.xyz", || Mesh {
         classes: None,
@@ -408,7 +412,9 @@ fn splats_of_a_ball() -> Splats {
         normals: Some(ball.positions.iter().map(|p| normalize(*p)).collect()),
         ..cloud(ball.positions.into_iter())
     };
-    splat::generate(&points, &params, &Silent).expect("points of a ball").0
+    splat::generate(&points, &params, &Silent)
+        .expect("points of a ball")
+        .0
 }
 
 /// A disc for every fourth point of [`hills`], of radius 1.5.

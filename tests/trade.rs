@@ -418,7 +418,7 @@ fn an_input_that_the_command_cannot_take_is_said_to_be_one() {
         ),
         (
             "stability voxelize fixtures/volumes/ball.nrrd",
-            "fixtures/volumes/ball.nrrd: holds a volume (nrrd), but a mesh or a molecule is needed",
+            "fixtures/volumes/ball.nrrd: holds a volume (nrrd), but a mesh, splats or a molecule is needed",
         ),
         (
             "stability compress-anim encode fixtures/volumes/ball.nrrd",

@@ -47,12 +47,14 @@ fn read_animation(name: &str, wrapped: &Wrapped) -> Result<(Subject, Vec<Input>)
     ))
 }
 
-/// Reads a mesh, or the atoms of a molecule that count: those of the first model.
+/// Reads a mesh, splats, or the atoms of a molecule that count: those of the first model.
 fn read_still(name: &str, format: Option<Format>) -> Result<(Subject, Input)> {
     let source = Source::open(name, machine::default_memory())?;
-    let (content, input, _) = io::read_one_of(&source, format, &[Kind::Mesh, Kind::Molecule])?;
+    let (content, input, _) =
+        io::read_one_of(&source, format, &[Kind::Mesh, Kind::Molecule, Kind::Splats])?;
     let subject = match content {
         Content::Mesh(mesh) => Subject::Mesh(mesh),
+        Content::Splats(splats) => Subject::Splats(splats),
         Content::Molecule(molecule) => {
             let selected = Selected::of(&molecule, 0, &SelectParams::default());
             let selected = selected.map_err(|error| match error {
@@ -66,7 +68,7 @@ fn read_still(name: &str, format: Option<Format>) -> Result<(Subject, Input)> {
         }
         other => {
             let found = other.kind().with_article();
-            let problem = format!("holds {found}, but a mesh or a molecule is needed");
+            let problem = format!("holds {found}, but a mesh, splats or a molecule is needed");
             return Err(Error::Malformed {
                 path: name.into(),
                 fault: Fault::whole(problem),
@@ -81,6 +83,7 @@ pub fn format_of(subject: &Subject) -> Format {
     match subject {
         Subject::Mesh(_) | Subject::Clip(_) => Format::Ply,
         Subject::Atoms(_) => Format::Xyzr,
+        Subject::Splats(_) => Format::Splats,
     }
 }
 
@@ -88,7 +91,7 @@ pub fn format_of(subject: &Subject) -> Format {
 pub fn stands_for(subject: &Subject) -> &'static [&'static str] {
     match subject {
         Subject::Clip(_) => OF_ANIMATIONS,
-        Subject::Mesh(_) | Subject::Atoms(_) => &[],
+        Subject::Mesh(_) | Subject::Atoms(_) | Subject::Splats(_) => &[],
     }
 }
 
@@ -101,6 +104,7 @@ pub fn write(subject: &Subject, path: &Path) -> Result<()> {
             let molecule = Molecule::of_spheres(balls).map_err(Error::Geometry)?;
             io::write_molecule(&molecule, &sink, format)?
         }
+        Subject::Splats(splats) => io::write_splats(splats, &sink, format)?,
         Subject::Clip(clip) => sequence::write(clip, &format!("{}/", path.display()), format)?,
     };
     drop(written);

@@ -1,4 +1,4 @@
-//! The steps: what is done to a mesh, to atoms or to an animation, and what of it is rounding.
+//! The steps: what is done to a mesh, to atoms, to discs or to an animation, and what of it is rounding.
 
 use super::motion::Motion;
 use super::subject::Subject;
@@ -6,6 +6,7 @@ use crate::anim::Clip;
 use crate::mesh::Mesh;
 use crate::numeric::rng::Rng;
 use crate::numeric::vector::{length, sub};
+use crate::points::Splats;
 use crate::protein::clearance::Ball;
 use crate::trade::Change;
 use schemars::JsonSchema;
@@ -109,6 +110,10 @@ impl Step {
                     Subject::Atoms(balls) => {
                         (Subject::Atoms(reordered(change, balls, seed)?), None)
                     }
+                    Subject::Splats(splats) => (
+                        Subject::Splats(rearranged_splats(change, splats, seed)?),
+                        None,
+                    ),
                     Subject::Clip(clip) => {
                         let (clip, order) = renumbered(change, clip, seed)?;
                         (Subject::Clip(clip), order)
@@ -154,6 +159,26 @@ fn reordered(change: Change, balls: &[Ball], seed: u64) -> Result<Vec<Ball>, Str
         _ => return Err("atoms have no faces".to_owned()),
     }
     Ok(changed)
+}
+
+/// The discs in another order, or twice: they have no elements to change.
+fn rearranged_splats(change: Change, splats: &Splats, seed: u64) -> Result<Splats, String> {
+    let mut order: Vec<usize> = (0..splats.splats.len()).collect();
+    match change {
+        Change::VertexOrder => shuffle(&mut order, seed),
+        Change::DuplicateFaces => order.extend_from_within(..),
+        _ => return Err("splats have no faces".to_owned()),
+    }
+    Ok(Splats {
+        splats: order.iter().map(|i| splats.splats[*i]).collect(),
+        colors: taken(splats.colors.as_deref(), &order),
+        classes: taken(splats.classes.as_deref(), &order),
+    })
+}
+
+/// Those of these indices, where there are any.
+fn taken<T: Copy>(items: Option<&[T]>, order: &[usize]) -> Option<Vec<T>> {
+    items.map(|items| order.iter().map(|i| items[*i]).collect())
 }
 
 /// The mesh with other elements, or in another order; and which vertex each was.
@@ -252,12 +277,9 @@ fn permute_vertices(mesh: &mut Mesh, seed: u64) -> Vec<usize> {
 /// Makes the vertices those of these old indices.
 fn take(mesh: &mut Mesh, order: &[usize]) {
     mesh.positions = order.iter().map(|v| mesh.positions[*v]).collect();
-    if let Some(normals) = &mut mesh.normals {
-        *normals = order.iter().map(|v| normals[*v]).collect();
-    }
-    if let Some(colors) = &mut mesh.colors {
-        *colors = order.iter().map(|v| colors[*v]).collect();
-    }
+    mesh.normals = taken(mesh.normals.as_deref(), order);
+    mesh.colors = taken(mesh.colors.as_deref(), order);
+    mesh.classes = taken(mesh.classes.as_deref(), order);
 }
 
 /// The same elements, none of which shares a vertex, and which vertex each was. Vertices that no element

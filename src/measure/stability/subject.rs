@@ -1,9 +1,10 @@
-//! What is taken to the extremes: a mesh, the atoms of a molecule, or an animation.
+//! What is taken to the extremes: a mesh, the atoms of a molecule, an animation, or discs.
 
 use super::motion::Motion;
 use crate::anim::Clip;
 use crate::mesh::Mesh;
 use crate::numeric::vector::Vec3;
+use crate::points::Splats;
 use crate::protein::clearance::Ball;
 use crate::spatial::aabb::Aabb;
 
@@ -16,6 +17,8 @@ pub enum Subject {
     Atoms(Vec<Ball>),
     /// Frames of one mesh.
     Clip(Clip),
+    /// Discs with fields of normals: points, directions and lengths.
+    Splats(Splats),
 }
 
 impl Subject {
@@ -26,6 +29,7 @@ impl Subject {
             Subject::Mesh(mesh) => mesh.positions.clone(),
             Subject::Atoms(balls) => balls.iter().map(|ball| ball.centre).collect(),
             Subject::Clip(clip) => clip.positions.clone(),
+            Subject::Splats(splats) => splats.splats.iter().map(|s| s.centre).collect(),
         }
     }
 
@@ -35,6 +39,7 @@ impl Subject {
             Subject::Mesh(mesh) => mesh.bounds(),
             Subject::Atoms(balls) => Aabb::around(balls.iter().map(|ball| &ball.centre)),
             Subject::Clip(clip) => clip.bounds(),
+            Subject::Splats(splats) => splats.bounds(),
         };
         let sides = bounds.extent();
         let longest = sides[0].max(sides[1]).max(sides[2]);
@@ -57,6 +62,10 @@ impl Subject {
                 let here = clip.mesh.positions.iter_mut().zip(first);
                 here.for_each(|(here, p)| *here = *p);
             }
+            Subject::Splats(splats) => {
+                let centres = splats.splats.iter_mut().map(|s| &mut s.centre);
+                centres.enumerate().for_each(each);
+            }
         }
         changed
     }
@@ -72,6 +81,18 @@ impl Subject {
             Subject::Atoms(balls) => {
                 let radii = balls.iter_mut().map(|ball| &mut ball.radius);
                 radii.for_each(|r| *r = motion.length(*r));
+            }
+            Subject::Splats(splats) => {
+                for splat in &mut splats.splats {
+                    for direction in [&mut splat.normal, &mut splat.tangent, &mut splat.field] {
+                        *direction = motion.turned(*direction);
+                    }
+                    for length in [&mut splat.radius, &mut splat.error] {
+                        *length = motion.length(*length);
+                    }
+                    // Per unit of length.
+                    splat.slopes = splat.slopes.map(|slope| motion.length_back(slope));
+                }
             }
         }
         changed
@@ -90,6 +111,9 @@ impl Subject {
             // What else a mesh or a clip has is as it was.
             Subject::Clip(clip) => self.with_points(|i, _| motion.undo(clip.positions[i])),
             Subject::Mesh(mesh) => self.with_points(|v, _| motion.undo(mesh.positions[v])),
+            Subject::Splats(splats) => {
+                self.with_points(|v, _| motion.undo(splats.splats[v].centre))
+            }
         }
     }
 
@@ -108,6 +132,11 @@ impl Subject {
         match self {
             Subject::Mesh(mesh) => finite(&mesh.positions),
             Subject::Clip(clip) => finite(&clip.positions),
+            Subject::Splats(splats) => splats.splats.iter().all(|splat| {
+                let [u, v] = splat.slopes;
+                let numbers = [splat.radius, splat.error, u, v];
+                splat.centre.iter().chain(&numbers).all(|c| c.is_finite())
+            }),
             Subject::Atoms(balls) => balls
                 .iter()
                 .all(|ball| ball.radius.is_finite() && ball.centre.iter().all(|c| c.is_finite())),
