@@ -36,7 +36,7 @@ pub use trade::TRADE;
 use crate::error::Result;
 use crate::image::raster::Raster;
 use crate::mesh::Mesh;
-use crate::numeric::vector::{Vec3, dot};
+use crate::numeric::vector::Vec3;
 use crate::progress::Progress;
 use crate::report::{self, Modelled, Warning};
 use cover::{Cover, Scratch};
@@ -82,7 +82,7 @@ pub struct Look {
     pub depth: f64,
     /// The unit normal that shades, pointing outwards; 0 where nothing is seen.
     pub normal: Vec3,
-    /// Whether it is seen from outside, as the disc's own plane has it.
+    /// Whether it is seen from outside; discs that stand out at an outline are, whatever side they show.
     pub outside: bool,
 }
 
@@ -145,7 +145,7 @@ fn look(middle: &Middle) -> Look {
         direction: ray.direction,
         depth: sight.map_or(f64::INFINITY, |s| s.t),
         normal: sight.map_or([0.0; 3], |s| s.normal),
-        outside: sight.is_some_and(|s| dot(s.plane, ray.direction) < 0.0),
+        outside: sight.is_some_and(|s| s.is_outside(ray)),
     }
 }
 

@@ -78,6 +78,25 @@ pub(super) struct Sight {
     pub around: u32,
     /// What they are off by at most.
     pub error: f64,
+    /// The sine of the angle by which normals turn on the disc.
+    pub lean: f64,
+}
+
+/// Normals that turn further on a disc say nothing of its sides.
+const MOST_LEAN: f64 = 0.5;
+
+impl Sight {
+    /// Whether a ray comes to it from outside.
+    ///
+    /// At an outline discs stand out and show their backs, though the surface that they stand for
+    /// turns away there and shows none: a back counts only where the normal that shades points away
+    /// too, by more than normals turn on the disc. A ray from within comes to every back.
+    pub fn is_outside(&self, ray: &Ray) -> bool {
+        let from = ray.from.filter(|from| from.object == self.object);
+        let inside = from.is_some_and(|from| from.side < 0.0);
+        dot(self.plane, ray.direction) < 0.0
+            || !inside && dot(self.normal, ray.direction) < self.lean
+    }
 }
 
 /// A lamp in the frame: where it is, and its light.
@@ -432,15 +451,19 @@ impl Object {
             Shape::Cover(cover) => {
                 let seen = cover.see(at, ray, limit, params.blend, hits, visits)?;
                 let own = seen.colour.filter(|_| self.takes_colours());
+                let splat = &cover.discs.splats[seen.disc as usize];
+                let [a, b] = splat.slopes;
+                let lean = splat.radius * a.hypot(b);
                 Some(Sight {
                     t: seen.t,
                     object: at,
                     item: seen.disc,
                     normal: seen.normal,
-                    plane: cover.discs.plates[seen.disc as usize].normal,
+                    plane: splat.normal,
                     colour: own.map_or(self.colour, |c| c.map(f64::from)),
                     around: seen.around,
                     error: seen.error,
+                    lean: lean.min(MOST_LEAN),
                 })
             }
             Shape::Mesh(triangles) => triangles.see(self, at, ray, limit),
@@ -462,6 +485,7 @@ impl Object {
             colour: self.colour,
             around: 0,
             error: 0.0,
+            lean: 0.0,
         }
     }
 

@@ -174,8 +174,7 @@ impl<'a> Follower<'a> {
 
     fn on_object(&mut self, ray: &Ray, sight: &Sight, depth: u32) -> Vec3 {
         let material = self.stage.objects[sight.object].material;
-        let outside = dot(sight.plane, ray.direction) < 0.0;
-        let side = if outside { 1.0 } else { -1.0 };
+        let side = if sight.is_outside(ray) { 1.0 } else { -1.0 };
         let normal = facing(scale(sight.normal, side), ray.direction);
         let place = ray.at(sight.t);
         let spot = Spot {
