@@ -13,7 +13,7 @@ use scantle::error::{Result, number};
 use scantle::image::colour::CLAY;
 use scantle::io;
 use scantle::io::format::{Format, Kind};
-use scantle::measure::splat_cover::{self, Coverage, Holes, Truth, Views};
+use scantle::measure::splat_cover::{self, Coverage, Holes, Piece, Truth, Views};
 use scantle::mesh::Mesh;
 use scantle::mesh::sampling;
 use scantle::points::Splats;
@@ -98,7 +98,7 @@ disc that covers it best, as a share of the diagonal; it is always measured. --v
 discs from all around, for holes.
 
 Examples:
-  scantle splat-gen fixtures/clouds/ball.xyz --delta 2% -o ball.ply --preview ball.png
+  scantle splat-gen fixtures/clouds/ball.xyz --delta 2% --max-radius 20% -o ball.ply --preview ball.png
   scantle splat-gen fixtures/shapes/torus-knot.ply --sample 20000 --delta 0.5% -o knot.glb
 ";
 
@@ -215,7 +215,7 @@ fn splat_gen(job: &mut Job, params: &Params, args: &Args) -> Result<Found<Asked,
     );
     let holes = args.verify.verify.then(|| {
         job.progress().stage("holes", 0);
-        let pieces = splat_cover::pieces(&cloud.positions, &splats.splats);
+        let pieces = Piece::around(&cloud.positions, params.neighbors);
         let tolerance = 4.0 * made.delta.abs.max(made.error.max);
         splat_cover::holes(&Truth::Pieces(&pieces), &splats.splats, tolerance, VIEWS)
     });

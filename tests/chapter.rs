@@ -51,7 +51,7 @@ const PARTS: &[Part] = &[
     },
     Part {
         command: "splat-gen",
-        words: "fixtures/clouds/ball.xyz",
+        words: "fixtures/clouds/ball.xyz --max-radius 20%",
         vary: "--vary delta=5%,2%,1%,0.5% --vary perc=0.8,0.5,0.2 --vary cover --repeat 3",
         advice: ADVICE_ON_DISCS,
         extremes: "--delta 2%",

@@ -55,7 +55,7 @@ const CLOUDS: &[Row<Mesh>] = &[
     ("clouds/hills.ply", hills),
     ("clouds/hills.pcd", hills),
     ("clouds/hills.csv", hills),
-    ("clouds/ball.xyz", || points_of_a_ball(3)),
+    ("clouds/ball.xyz", || points_of_a_ball(4)),
     ("clouds/line.xyz", || {
         cloud((0..9).map(|i| [f64::from(i), 2.0 * f64::from(i), 0.5]))
     }),

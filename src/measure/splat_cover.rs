@@ -6,8 +6,9 @@
 use crate::numeric::sums::sum_by;
 use crate::numeric::vector::{Vec3, add, cross, dot, length, normalize, scale, sub};
 use crate::points::Splat;
+use crate::points::normals::{Neighbourhoods, planes};
 use crate::spatial::aabb::Aabb;
-use crate::spatial::bvh::{Bvh, Nearest};
+use crate::spatial::bvh::Bvh;
 use crate::spatial::kdtree::KdTree;
 use crate::spatial::local::LocalFrame;
 use rayon::prelude::*;
@@ -18,6 +19,8 @@ use serde::Serialize;
 const LEAF: usize = 8;
 /// Boxes of one level in one box of the next.
 const FAN: usize = 4;
+/// A disc is large where the box around it is so many times that of the points.
+const LARGE: f32 = 3.0;
 /// Points below which a box is searched by one thread.
 const PARALLEL: usize = 1 << 12;
 /// A rim or a height is met up to this share of the largest coordinate: the roundings of a centre.
@@ -83,9 +86,9 @@ impl Runs {
     }
 
     /// What covers each point best, in the order of the curve.
-    fn best(&self, discs: &[Disc]) -> Vec<Best> {
+    fn best(&self, discs: &Found) -> Vec<Best> {
         let mut best = vec![Best::NONE; self.points.len()];
-        let mut lists: Vec<u32> = (0..discs.len() as u32).collect();
+        let mut lists: Vec<u32> = (0..discs.discs.len() as u32).collect();
         let top = self.levels.len() - 1;
         self.descend((top, 0), discs, 0, &mut lists, &mut best);
         best
@@ -96,25 +99,26 @@ impl Runs {
     fn descend(
         &self,
         (level, node): (usize, usize),
-        discs: &[Disc],
+        found: &Found,
         from: usize,
         lists: &mut Vec<u32>,
         best: &mut [Best],
     ) {
         let own = &self.levels[level][node];
+        let coarse = Coarse::around(own);
         let start = lists.len();
         lists.resize(2 * start - from, 0);
         let (before, list) = lists.split_at_mut(start);
         let mut count = 0;
         for &i in &before[from..] {
             list[count] = i;
-            count += usize::from(discs[i as usize].reaches(own));
+            count += usize::from(found.may_reach(i as usize, &coarse, own));
         }
         lists.truncate(start + count);
         if level == 0 {
             let points = &self.points[node * LEAF..];
             for &i in &lists[start..] {
-                discs[i as usize].measure(i, points, best);
+                found.discs[i as usize].measure(i, points, best);
             }
         } else if count > 0 {
             let part = LEAF * FAN.pow(level as u32 - 1);
@@ -124,11 +128,11 @@ impl Runs {
                 best.par_chunks_mut(part)
                     .enumerate()
                     .for_each(|(number, best)| {
-                        self.descend(child(number), discs, 0, &mut list.to_vec(), best);
+                        self.descend(child(number), found, 0, &mut list.to_vec(), best);
                     });
             } else {
                 for (number, best) in best.chunks_mut(part).enumerate() {
-                    self.descend(child(number), discs, start, lists, best);
+                    self.descend(child(number), found, start, lists, best);
                 }
             }
         }
@@ -167,6 +171,69 @@ fn key(p: Vec3) -> u64 {
     key
 }
 
+/// A box in single precision, rounded outwards: a quarter of a disc to read.
+#[derive(Debug, Clone, Copy)]
+struct Coarse {
+    lo: [f32; 3],
+    hi: [f32; 3],
+}
+
+impl Coarse {
+    fn around(bounds: &Aabb) -> Self {
+        Coarse {
+            lo: bounds.lo.map(|c| (c as f32).next_down()),
+            hi: bounds.hi.map(|c| (c as f32).next_up()),
+        }
+    }
+
+    #[inline]
+    fn meets(&self, other: &Coarse) -> bool {
+        let mut meets = true;
+        for a in 0..3 {
+            meets &= self.lo[a] <= other.hi[a] && self.hi[a] >= other.lo[a];
+        }
+        meets
+    }
+
+    /// The longest side.
+    #[inline]
+    fn size(&self) -> f32 {
+        let side = |a: usize| self.hi[a] - self.lo[a];
+        side(0).max(side(1)).max(side(2))
+    }
+}
+
+/// The discs, and a box around all that each may cover.
+struct Found {
+    discs: Vec<Disc>,
+    boxes: Vec<Coarse>,
+}
+
+impl Found {
+    fn of(splats: &[Splat], frame: &LocalFrame, unit: f64, rounding: f64) -> Self {
+        let discs: Vec<Disc> = splats
+            .par_iter()
+            .map(|splat| Disc::of(splat, frame, unit, rounding))
+            .collect();
+        let around = |disc: &Disc| {
+            Coarse::around(&Aabb {
+                lo: sub(disc.centre, disc.reach),
+                hi: add(disc.centre, disc.reach),
+            })
+        };
+        let boxes = discs.par_iter().map(around).collect();
+        Found { discs, boxes }
+    }
+
+    /// Whether a disc may cover something in a box. Only those much larger than the box are told by
+    /// their plane as well.
+    #[inline]
+    fn may_reach(&self, i: usize, coarse: &Coarse, bounds: &Aabb) -> bool {
+        let own = &self.boxes[i];
+        own.meets(coarse) && (own.size() < LARGE * coarse.size() || self.discs[i].reaches(bounds))
+    }
+}
+
 /// A disc in the frame.
 struct Disc {
     centre: Vec3,
@@ -192,19 +259,15 @@ impl Disc {
         }
     }
 
-    /// Whether it may cover something in a box.
+    /// Whether what it covers lies between planes that meet a box.
     #[inline]
     fn reaches(&self, bounds: &Aabb) -> bool {
         let (mut middle, mut extent) = (0.0, self.error + 2.0 * self.rounding);
-        let mut near = true;
         for a in 0..3 {
-            let offset = 0.5 * (bounds.lo[a] + bounds.hi[a]) - self.centre[a];
-            let half = 0.5 * (bounds.hi[a] - bounds.lo[a]);
-            near &= offset.abs() <= half + self.reach[a];
-            middle += self.normal[a] * offset;
-            extent += self.normal[a].abs() * half;
+            middle += self.normal[a] * (0.5 * (bounds.lo[a] + bounds.hi[a]) - self.centre[a]);
+            extent += self.normal[a].abs() * 0.5 * (bounds.hi[a] - bounds.lo[a]);
         }
-        near && middle.abs() <= extent
+        middle.abs() <= extent
     }
 
     /// Notes for each of the points whether it covers it.
@@ -219,7 +282,7 @@ impl Disc {
             let d = sub(*p, self.centre);
             let height = dot(d, self.normal);
             let rest = dot(d, d) - height * height;
-            if height.abs() > high || rest > square + lost {
+            if (height.abs() > high) | (rest > square + lost) {
                 continue;
             }
             let along = || sub(d, scale(self.normal, height));
@@ -257,13 +320,10 @@ pub fn coverage(
     let corner = bounds.lo.iter().chain(&bounds.hi);
     let largest = corner.fold(0.0f64, |m, c| m.max((c / unit).abs())).max(1.0);
     let rounding = ROUNDING * largest;
-    let discs: Vec<Disc> = splats
-        .par_iter()
-        .map(|splat| Disc::of(splat, &frame, unit, rounding))
-        .collect();
-    let best = runs.best(&discs);
+    let found = Found::of(splats, &frame, unit, rounding);
+    let best = runs.best(&found);
     let over: u64 = best.iter().map(|b| u64::from(b.count)).sum();
-    let angles = truth.map(|truth| angles(&runs, splats, (&discs, unit), &best, truth));
+    let angles = truth.map(|truth| angles(&runs, splats, (&found.discs, unit), &best, truth));
     let heights = best.into_iter().map(|b| b.height).collect();
     let mut result = judge(&runs, splats, &frame, heights, bound / unit + rounding);
     result.discs_per_point = over as f64 / positions.len() as f64;
@@ -334,23 +394,15 @@ impl Discs {
         Discs { splats, tree }
     }
 
-    fn find(&self, p: Vec3) -> Option<Nearest> {
-        self.tree.nearest(p, f64::INFINITY, |i| {
+    fn distance(&self, p: Vec3) -> f64 {
+        let found = self.tree.nearest(p, f64::INFINITY, |i| {
             let splat = &self.splats[i as usize];
             let d = sub(p, splat.centre);
             let height = dot(d, splat.normal);
             let beyond = (length(sub(d, scale(splat.normal, height))) - splat.radius).max(0.0);
             height * height + beyond * beyond
-        })
-    }
-
-    fn distance(&self, p: Vec3) -> f64 {
-        let found = self.find(p);
+        });
         found.map_or(f64::INFINITY, |n| n.distance_squared.sqrt())
-    }
-
-    fn nearest(&self, p: Vec3) -> Option<usize> {
-        self.find(p).map(|n| n.item as usize)
     }
 }
 
@@ -386,28 +438,26 @@ pub struct Piece {
     pub radius: f64,
 }
 
-/// A piece of surface around each point of a cloud, in the plane of the disc nearest to it, of half the
-/// mean distance to its six nearest neighbours; none where there is no disc.
-///
-/// Positions are finite. Cost: O(n log n).
-pub fn pieces(positions: &[Vec3], splats: &[Splat]) -> Vec<Piece> {
-    let frame = LocalFrame::around(Aabb::around(positions));
-    let local: Vec<Vec3> = positions.par_iter().map(|p| frame.to_local(*p)).collect();
-    let count = local.len().saturating_sub(1).min(6);
-    let near = KdTree::build(&local).neighbours(&local, count);
-    let discs = Discs::new(splats, &frame);
-    let piece = |(i, p): (usize, &Vec3)| {
-        let disc = discs.nearest(*p)?;
-        let others = near[i * count..(i + 1) * count].iter();
-        let ways = others.map(|o| length(sub(local[*o as usize], *p)));
-        let mean = ways.sum::<f64>() / count.max(1) as f64;
-        Some(Piece {
-            centre: positions[i],
-            normal: splats[disc].normal,
-            radius: frame.length(0.5 * mean),
-        })
-    };
-    local.par_iter().enumerate().filter_map(piece).collect()
+impl Piece {
+    /// A piece around each point: the circle about the square that it stands for, in the plane through
+    /// `neighbours` others. Points on a line with their neighbours have none.
+    ///
+    /// Cost: a search for each point.
+    pub fn around(positions: &[Vec3], neighbours: usize) -> Vec<Piece> {
+        let frame = LocalFrame::around(Aabb::around(positions));
+        let points: Vec<Vec3> = positions.iter().map(|p| frame.to_local(*p)).collect();
+        let tree = KdTree::build(&points);
+        let near = Neighbourhoods::of(&tree, &points, neighbours);
+        let planes = planes(&tree, &points, &near).into_iter().zip(positions);
+        planes
+            .filter(|(plane, _)| plane.normal != [0.0; 3])
+            .map(|(plane, p)| Piece {
+                centre: *p,
+                normal: plane.normal,
+                radius: frame.length(plane.spacing * std::f64::consts::FRAC_1_SQRT_2),
+            })
+            .collect()
+    }
 }
 
 /// What the surface is where holes are looked for.
@@ -679,6 +729,16 @@ mod tests {
                 radius: 0.75,
             })
             .collect();
+        let found = Piece::around(&positions, 8);
+        assert_eq!(found.len(), 400);
+        // Eight neighbours up to the diagonal of a square share out their disc.
+        let radius = (2.0 * std::f64::consts::PI / 8.0 / 2.0).sqrt();
+        assert!(
+            (found[210].radius - radius).abs() < 1e-12,
+            "{:?}",
+            found[210]
+        );
+        assert!(found.iter().all(|p| p.normal[2].abs() > 1.0 - 1e-12));
         let views = Views {
             count: 6,
             pixels: 200,

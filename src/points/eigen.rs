@@ -39,8 +39,9 @@ fn closed_form(m: &Symmetric) -> Option<(Vec3, Vec3)> {
     let high = mean + 2.0 * spread * angle.cos();
     let low = mean + 2.0 * spread * (angle + std::f64::consts::TAU / 3.0).cos();
     let middle = 3.0 * mean - high - low;
+    let gap = middle - low;
     // NaN where all are equal, which is not apart either.
-    if !(middle - low > CLOSE * high) {
+    if gap.is_nan() || gap <= CLOSE * high {
         return None;
     }
     // The rows of what is left are across the vector: two of them span the plane.

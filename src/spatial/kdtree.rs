@@ -295,7 +295,7 @@ fn cut(
         return Vec::new();
     }
     let start = (number * count) >> level;
-    let middle = ((2 * number + 1) * count >> (level + 1)) - start;
+    let middle = (((2 * number + 1) * count) >> (level + 1)) - start;
     let mut lo = [f64::INFINITY; 3];
     let mut hi = [f64::NEG_INFINITY; 3];
     for entry in entries.iter() {

@@ -306,7 +306,7 @@ impl Growth {
             .iter()
             .fold(0.0, |m: f64, n| m.max(n.distance_squared));
         let bins = ((farthest.sqrt() - self.last) / width).ceil();
-        if !(bins <= BINS as f64) {
+        if bins.is_nan() || bins > BINS as f64 {
             return false;
         }
         let all = if bins >= BINS as f64 {

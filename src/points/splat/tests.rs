@@ -83,7 +83,7 @@ fn rim_error_deg(splat: &Splat) -> f64 {
             .to_degrees()
     };
     (0..16)
-        .map(|k| angle(f64::from(k) * 0.3927))
+        .map(|k| angle(f64::from(k) * std::f64::consts::FRAC_PI_8))
         .fold(0.0, f64::max)
 }
 
