@@ -98,7 +98,7 @@ disc that covers it best, as a share of the diagonal; it is always measured. --v
 discs from all around, for holes.
 
 Examples:
-  scantle splat-gen fixtures/clouds/ball.xyz --delta 2% --max-radius 20% -o ball.ply --preview ball.png
+  scantle splat-gen fixtures/clouds/ball.xyz --delta 2% --max-radius 20% -o ball.ply
   scantle splat-gen fixtures/shapes/torus-knot.ply --sample 20000 --delta 0.5% -o knot.glb
 ";
 

@@ -251,6 +251,9 @@ impl<'a> Bench<'a> {
                 let Some(numbers) = value.strip_prefix(prefix) else {
                     continue;
                 };
+                if numbers.ends_with('%') {
+                    continue;
+                }
                 let wrong = |why: String| format!("--{option} {value}: {why}");
                 let numbers = numbers.split(',').map(|n| n.trim().parse());
                 let numbers: Result<Vec<f64>, _> = numbers.collect();

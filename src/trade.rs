@@ -50,7 +50,8 @@ impl Knob {
 pub struct Placed {
     /// The long option, without dashes. Where it may be given several times, each value is moved.
     pub option: &'static str,
-    /// What stands before the numbers; a value without it holds none. Empty as a rule.
+    /// What stands before the numbers; a value without it holds none, nor does a share of the input, which
+    /// ends in `%`. Empty as a rule.
     pub prefix: &'static str,
     /// What its comma-separated numbers are, in order.
     pub parts: &'static [Part],

@@ -259,7 +259,7 @@ fn what_cannot_be_varied_is_refused_with_words() {
     for (line, why) in [
         (
             "tradeoff nonsense a --vary mode",
-            "tradeoff: there is no command nonsense; those with a trade: voxelize, shadow, smooth-mc, tunnels, compress-anim encode",
+            "tradeoff: there is no command nonsense; those with a trade: voxelize, shadow, smooth-mc, tunnels, splat-gen, splat-trace, compress-anim encode",
         ),
         (
             "tradeoff info a --vary mode",
@@ -418,7 +418,7 @@ fn an_input_that_the_command_cannot_take_is_said_to_be_one() {
         ),
         (
             "stability voxelize fixtures/volumes/ball.nrrd",
-            "fixtures/volumes/ball.nrrd: holds a volume (nrrd), but a mesh, splats or a molecule is needed",
+            "fixtures/volumes/ball.nrrd: holds a volume (nrrd), but a mesh or a molecule or a set of splats is needed",
         ),
         (
             "stability compress-anim encode fixtures/volumes/ball.nrrd",
