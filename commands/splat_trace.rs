@@ -120,7 +120,7 @@ every disc for some of the rays: the tree must give the same to the last bit.
 
 Examples:
   scantle splat-trace fixtures/splats/sphere.ply --size 320x240 -o sphere.png
-  scantle splat-trace fixtures/splats/sphere.ply --sphere 1.6,-0.5,0.8,0.5 --material 0:gloss,colour=#d55e00 --material 1:mirror --ground checker --size 320x240 -o mirror.png
+  scantle splat-trace fixtures/splats/sphere.ply --sphere 2,0,0,.5 --material 1:mirror -o m.png
 ";
 
 /// What was asked for.
