@@ -65,19 +65,16 @@ pub fn in_triangle(place: &Place) -> [f64; 2] {
 /// corners are mixed, the class is that of the nearest corner. Equal input and seed give equal points on
 /// any number of threads. Errs where the mesh has no triangle with an area. Cost: linear.
 pub fn sample(mesh: &Mesh, count: u64, seed: u64) -> Result<Mesh> {
-    let twice = |t: usize| {
-        let [a, b, c] = mesh.corners(t);
-        cross(sub(b, a), sub(c, a))
-    };
     // Shares of the largest side, as products of tiny or huge ones would be lost.
     let extent = mesh.bounds().extent();
     let unit = extent[0].max(extent[1]).max(extent[2]);
     let triangles = 0..mesh.triangles.len();
-    let area = |t: usize| {
+    let twice = |t: usize| {
         let [a, b, c] = mesh.corners(t);
         let [e, f] = [sub(b, a), sub(c, a)].map(|side| side.map(|x| x / unit));
-        length(cross(e, f))
+        cross(e, f)
     };
+    let area = |t: usize| length(twice(t));
     let areas: Vec<f64> = if unit > 0.0 && unit.is_finite() {
         triangles.into_par_iter().map(area).collect()
     } else {
@@ -95,7 +92,7 @@ pub fn sample(mesh: &Mesh, count: u64, seed: u64) -> Result<Mesh> {
         add(a, add(scale(sub(b, a), u), scale(sub(c, a), v)))
     };
     let normal = |place: &Place| -> Vec3 {
-        let normal = twice(place.element).map(|x| x / unit);
+        let normal = twice(place.element);
         let largest = normal.iter().fold(0.0f64, |m, x| m.max(x.abs()));
         let normal = normal.map(|x| x / largest);
         scale(normal, 1.0 / length(normal))
