@@ -142,7 +142,7 @@ impl Motion {
 
     /// Hands over frames of the window, one after the other, in local coordinates, before corrections.
     ///
-    /// Several are made together where that is faster, as many as [`TOGETHER`] positions hold.
+    /// Several are made together where that is faster, as many as hold a quarter of a million positions.
     pub fn each_frame(
         &self,
         vertices: usize,

@@ -31,7 +31,7 @@ pub fn write(mesh: &Mesh, out: &mut dyn Write) -> io::Result<()> {
     out.write_all(&bytes)
 }
 
-/// Writes the vertices as [`write`] does, with the points packed by LASzip.
+/// Writes the vertices as [`write()`] does, with the points packed by LASzip.
 ///
 /// Cost: linear; the packed points are held until all are.
 pub fn write_packed(mesh: &Mesh, out: &mut dyn Write) -> io::Result<()> {
