@@ -13,7 +13,8 @@ use scantle::error::{Result, number};
 use scantle::image::colour::CLAY;
 use scantle::io;
 use scantle::io::format::{Format, Kind};
-use scantle::measure::splat_cover::{self, Coverage, Holes, Piece, Truth, Views};
+use scantle::measure::splat_cover::{self, Coverage};
+use scantle::measure::splat_holes::{self, Holes, Piece, Truth, Views};
 use scantle::mesh::Mesh;
 use scantle::mesh::sampling;
 use scantle::points::Splats;
@@ -170,6 +171,10 @@ const VIEWS: Views = Views {
     pixels: 512,
 };
 
+/// How far behind the surface a disc fills it, in bounds: discs that cover the same points are up to two
+/// apart, and so are the points beside them that noise puts on either side.
+const BEHIND: f64 = 4.0;
+
 /// Covers each input.
 pub fn run(args: &Args) -> Result<Exit> {
     let context = Context::new(&args.common)?;
@@ -193,13 +198,13 @@ pub fn run(args: &Args) -> Result<Exit> {
 fn splat_gen(job: &mut Job, params: &Params, args: &Args) -> Result<Found<Asked, Stats>> {
     let form = form(job, args)?;
     job.skip_bad(args.skip_bad.skip_bad);
-    let mesh = job.read_mesh()?;
+    let mut mesh = job.read_mesh()?;
     let name = job.words()[0].clone();
     let points = args.sample.map_or(mesh.positions.len() as u128, u128::from);
     job.expect_room("the cloud", points * BYTES_PER_POINT)?;
     let mut cloud = match args.sample {
         Some(count) => sampling::sample(&mesh, u64::from(count), args.seed.seed)?,
-        None => mesh.clone(),
+        None => std::mem::take(&mut mesh),
     };
     let truth = cloud.normals.clone();
     if args.estimate_normals {
@@ -215,9 +220,15 @@ fn splat_gen(job: &mut Job, params: &Params, args: &Args) -> Result<Found<Asked,
     );
     let holes = args.verify.verify.then(|| {
         job.progress().stage("holes", 0);
-        let pieces = Piece::around(&cloud.positions, params.neighbors);
-        let tolerance = 4.0 * made.delta.abs.max(made.error.max);
-        splat_cover::holes(&Truth::Pieces(&pieces), &splats.splats, tolerance, VIEWS)
+        let behind = BEHIND * made.delta.abs.max(made.error.max);
+        let holes = |truth| splat_holes::holes(&truth, &splats.splats, behind, VIEWS);
+        match args.sample {
+            Some(_) => holes(Truth::Mesh(&mesh)),
+            None => holes(Truth::Pieces(&Piece::around(
+                &cloud.positions,
+                params.neighbors,
+            ))),
+        }
     });
     job.warn(made.warnings());
     match form {
@@ -234,13 +245,16 @@ fn splat_gen(job: &mut Job, params: &Params, args: &Args) -> Result<Found<Asked,
         .is_some_and(|input| ["las", "laz"].contains(&&*input.format));
     let up = if is_scan { Up::Z } else { Up::Y };
     job.write_preview(|_| picture(&name, up, &cloud, &splats, &made));
-    let summary = format!(
-        "{} discs for {} points, {} not covered, at most {} away",
-        made.splats,
-        made.points,
-        coverage.uncovered,
-        number(coverage.max_distance.unwrap_or_default())
-    );
+    let summary = match coverage.max_distance {
+        Some(distance) => format!(
+            "{} discs for {} points, {} not covered, at most {} away",
+            made.splats,
+            made.points,
+            coverage.uncovered,
+            number(distance)
+        ),
+        None => format!("no disc for {} points", made.points),
+    };
     let asked = Asked {
         params: *params,
         estimate_normals: args.estimate_normals,
@@ -250,7 +264,7 @@ fn splat_gen(job: &mut Job, params: &Params, args: &Args) -> Result<Found<Asked,
         format: form,
         sides: (form == Some(Form::Discs)).then_some(args.sides),
     };
-    let accuracy = accuracy(&made, &coverage, holes.as_ref());
+    let accuracy = accuracy(&made, &coverage, holes.as_ref(), args.sample.is_some());
     let modelled = Modelled::new("discs", made.splats, made.points, made.bytes_after);
     let stats = Stats {
         made,
@@ -280,7 +294,12 @@ fn form(job: &Job, args: &Args) -> Result<Option<Form>> {
     Ok(Some(form))
 }
 
-fn accuracy(made: &splat::Stats, coverage: &Coverage, holes: Option<&Holes>) -> Vec<Accuracy> {
+fn accuracy(
+    made: &splat::Stats,
+    coverage: &Coverage,
+    holes: Option<&Holes>,
+    sampled: bool,
+) -> Vec<Accuracy> {
     let diagonal = made.delta.diag.map(|share| made.delta.abs / share);
     let of_diagonal = |length: f64| diagonal.map(|diagonal| length / diagonal);
     let trade = &splat::TRADE;
@@ -288,7 +307,8 @@ fn accuracy(made: &splat::Stats, coverage: &Coverage, holes: Option<&Holes>) -> 
         Accuracy {
             measure: trade.error.name.to_owned(),
             unit: trade.error.unit.to_owned(),
-            bound: made.delta.diag,
+            // Points on lines have no disc, and may be any distance from those of others.
+            bound: made.delta.diag.filter(|_| made.lines == 0),
             reached: coverage.max_distance.and_then(of_diagonal),
             reference: trade.reference.to_owned(),
             verified: true,
@@ -319,7 +339,14 @@ fn accuracy(made: &splat::Stats, coverage: &Coverage, holes: Option<&Holes>) -> 
             unit: "share of pixels".to_owned(),
             bound: None,
             reached: Some(holes.share),
-            reference: "a disc of the spacing around each point, seen from 20 sides".to_owned(),
+            reference: format!(
+                "{}, seen from {} sides, with a disc at most {BEHIND} bounds behind it",
+                match sampled {
+                    true => "the mesh",
+                    false => "a disc of the spacing around each point",
+                },
+                VIEWS.count
+            ),
             verified: true,
         });
     }

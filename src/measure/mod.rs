@@ -11,6 +11,7 @@ mod sides;
 pub mod smooth_error;
 pub mod splat_cover;
 pub mod splat_error;
+pub mod splat_holes;
 pub mod stability;
 mod surface;
 #[cfg(test)]

@@ -1,15 +1,13 @@
-//! Whether discs cover a cloud: every point against all discs over it, and what is seen from around.
+//! Whether discs cover a cloud: every point against all discs over it.
 //!
 //! Nothing here is shared with how the discs were made: points are searched through boxes of runs of
-//! them along a curve, disc by disc, and holes are looked for on rasters.
+//! them along a curve, disc by disc.
 
 use crate::numeric::sums::sum_by;
-use crate::numeric::vector::{Vec3, add, cross, dot, length, normalize, scale, sub};
+use crate::numeric::vector::{Vec3, add, cross, dot, length, scale, sub};
 use crate::points::Splat;
-use crate::points::normals::{Neighbourhoods, planes};
 use crate::spatial::aabb::Aabb;
 use crate::spatial::bvh::Bvh;
-use crate::spatial::kdtree::KdTree;
 use crate::spatial::local::LocalFrame;
 use rayon::prelude::*;
 use schemars::JsonSchema;
@@ -25,9 +23,6 @@ const LARGE: f32 = 3.0;
 const PARALLEL: usize = 1 << 12;
 /// A rim or a height is met up to this share of the largest coordinate: the roundings of a centre.
 const ROUNDING: f64 = 64.0 * f64::EPSILON;
-/// Nearer to the silhouette than this cosine between normal and view nothing is judged.
-const GRAZING: f64 = 0.2;
-
 /// How well discs cover the points of a cloud.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, JsonSchema)]
 pub struct Coverage {
@@ -427,223 +422,13 @@ fn angles(
     (0..best.len()).into_par_iter().filter_map(angle).collect()
 }
 
-/// A round piece of the surface that discs should cover.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Piece {
-    /// Its centre.
-    pub centre: Vec3,
-    /// Its unit normal.
-    pub normal: Vec3,
-    /// Its radius.
-    pub radius: f64,
-}
-
-impl Piece {
-    /// A piece around each point: the circle about the square that it stands for, in the plane through
-    /// `neighbours` others. Points on a line with their neighbours have none.
-    ///
-    /// Cost: a search for each point.
-    pub fn around(positions: &[Vec3], neighbours: usize) -> Vec<Piece> {
-        let frame = LocalFrame::around(Aabb::around(positions));
-        let points: Vec<Vec3> = positions.iter().map(|p| frame.to_local(*p)).collect();
-        let tree = KdTree::build(&points);
-        let near = Neighbourhoods::of(&tree, &points, neighbours);
-        let planes = planes(&tree, &points, &near).into_iter().zip(positions);
-        planes
-            .filter(|(plane, _)| plane.normal != [0.0; 3])
-            .map(|(plane, p)| Piece {
-                centre: *p,
-                normal: plane.normal,
-                radius: frame.length(plane.spacing * std::f64::consts::FRAC_1_SQRT_2),
-            })
-            .collect()
-    }
-}
-
-/// What the surface is where holes are looked for.
-pub enum Truth<'a> {
-    /// Pieces, such as a disc of the spacing around each point.
-    Pieces(&'a [Piece]),
-    /// The first hit of a ray from a point in a unit direction: its distance and unit normal.
-    Rays(&'a (dyn Fn(Vec3, Vec3) -> Option<(f64, Vec3)> + Sync)),
-}
-
-/// Views to look from.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Views {
-    /// How many directions, spread evenly.
-    pub count: usize,
-    /// Pixels along each side of a picture.
-    pub pixels: usize,
-}
-
-/// What is seen of a surface through its discs.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, JsonSchema)]
-pub struct Holes {
-    /// Pixels, of all views, that show the surface.
-    pub seen: u64,
-    /// Those of them that show no disc there: nothing, or something behind.
-    pub holes: u64,
-    /// Their share.
-    pub share: f64,
-    /// Their area, in the square of the unit: as the views see them, on average.
-    pub area: f64,
-}
-
-/// Looks at discs from around, along parallel rays, for places where the surface shows and no disc does.
-///
-/// A disc is there when it is no farther behind the surface than `tolerance` along the surface's normal.
-/// Pixels beside the silhouette, and those that see the surface at less than some 12 degrees, are not
-/// judged. The views are spread as the seeds of a sunflower. Cost: for each view the pixels that discs
-/// and pieces cover.
-pub fn holes(truth: &Truth, splats: &[Splat], tolerance: f64, views: Views) -> Holes {
-    let bounds = splats
-        .iter()
-        .fold(Aabb::EMPTY, |all, s| all.union(s.bounds()));
-    let bounds = match truth {
-        Truth::Pieces(pieces) => pieces.iter().fold(bounds, |all, p| all.with(p.centre)),
-        Truth::Rays(_) => bounds,
-    };
-    if bounds.is_empty() || views.count == 0 || views.pixels == 0 {
-        return Holes::default();
-    }
-    let half = 0.5 * bounds.diagonal();
-    let pixel = 2.0 * half / views.pixels as f64;
-    let (mut seen, mut missing) = (0u64, 0u64);
-    for view in 0..views.count {
-        let screen = Screen::new(spread(view, views.count), &bounds, half, views.pixels);
-        let (s, m) = screen.judge(truth, splats, tolerance);
-        seen += s;
-        missing += m;
-    }
-    Holes {
-        seen,
-        holes: missing,
-        share: missing as f64 / seen.max(1) as f64,
-        area: missing as f64 / views.count as f64 * pixel * pixel,
-    }
-}
-
-/// One of directions spread evenly over the sphere.
-fn spread(i: usize, count: usize) -> Vec3 {
-    let z = 1.0 - (2.0 * i as f64 + 1.0) / count as f64;
-    let turn = i as f64 * std::f64::consts::PI * (3.0 - 5.0f64.sqrt());
-    let r = (1.0 - z * z).sqrt();
-    [r * turn.cos(), r * turn.sin(), z]
-}
-
-/// A picture by parallel rays.
-struct Screen {
-    /// Right, up, and the way the rays go.
-    axes: [Vec3; 3],
-    /// Where the ray of the lower left corner begins.
-    origin: Vec3,
-    pixel: f64,
-    size: usize,
-}
-
-/// What is nearest in a pixel: its depth, and the normal of it.
-type Seen = Option<(f64, Vec3)>;
-
-impl Screen {
-    fn new(way: Vec3, bounds: &Aabb, half: f64, size: usize) -> Self {
-        let side = if way[2].abs() < 0.9 {
-            [0.0, 0.0, 1.0]
-        } else {
-            [1.0, 0.0, 0.0]
-        };
-        let right = normalize(cross(way, side));
-        let up = cross(right, way);
-        let back = add(scale(way, 2.0), add(right, up));
-        Screen {
-            axes: [right, up, way],
-            origin: sub(bounds.centre(), scale(back, half)),
-            pixel: 2.0 * half / size as f64,
-            size,
-        }
-    }
-
-    fn ray(&self, x: usize, y: usize) -> Vec3 {
-        let at = |p: usize, axis: Vec3| scale(axis, (p as f64 + 0.5) * self.pixel);
-        add(self.origin, add(at(x, self.axes[0]), at(y, self.axes[1])))
-    }
-
-    fn judge(&self, truth: &Truth, splats: &[Splat], tolerance: f64) -> (u64, u64) {
-        let wanted = match truth {
-            Truth::Pieces(pieces) => self.draw(pieces.iter().copied()),
-            Truth::Rays(hit) => (0..self.size * self.size)
-                .into_par_iter()
-                .map(|i| hit(self.ray(i % self.size, i / self.size), self.axes[2]))
-                .collect(),
-        };
-        let found = self.draw(splats.iter().map(|s| Piece {
-            centre: s.centre,
-            normal: s.normal,
-            radius: s.radius,
-        }));
-        let (mut seen, mut missing) = (0, 0);
-        for y in 1..self.size.saturating_sub(1) {
-            for x in 1..self.size - 1 {
-                let at = |dx: usize, dy: usize| wanted[(y + dy - 1) * self.size + x + dx - 1];
-                let Some((depth, normal)) = at(1, 1) else {
-                    continue;
-                };
-                let slant = dot(normal, self.axes[2]).abs();
-                let inside = (0..9).all(|k| at(k % 3, k / 3).is_some());
-                if !inside || slant < GRAZING {
-                    continue;
-                }
-                seen += 1;
-                let there = found[y * self.size + x]
-                    .is_some_and(|(other, _)| (other - depth) * slant <= tolerance);
-                missing += u64::from(!there);
-            }
-        }
-        (seen, missing)
-    }
-
-    /// The nearest of round pieces in each pixel.
-    fn draw(&self, pieces: impl Iterator<Item = Piece>) -> Vec<Seen> {
-        let mut picture: Vec<Seen> = vec![None; self.size * self.size];
-        for piece in pieces {
-            let d = sub(piece.centre, self.origin);
-            let [x, y, depth] = self.axes.map(|a| dot(d, a));
-            let [nx, ny, nz] = self.axes.map(|a| dot(piece.normal, a));
-            if nz == 0.0 {
-                continue;
-            }
-            let span = |at: f64, n: f64| {
-                let reach = piece.radius * (1.0 - n * n).max(0.0).sqrt();
-                let cell = |c: f64| (c / self.pixel - 0.5).clamp(-1.0, self.size as f64);
-                let first = cell(at - reach).ceil().max(0.0) as usize;
-                let last = cell(at + reach).floor();
-                first..(last + 1.0).clamp(0.0, self.size as f64) as usize
-            };
-            for row in span(y, ny) {
-                let dy = (row as f64 + 0.5) * self.pixel - y;
-                for column in span(x, nx) {
-                    let dx = (column as f64 + 0.5) * self.pixel - x;
-                    let dz = -(nx * dx + ny * dy) / nz;
-                    if dx * dx + dy * dy + dz * dz > piece.radius * piece.radius {
-                        continue;
-                    }
-                    let pixel = &mut picture[row * self.size + column];
-                    if pixel.is_none_or(|(nearest, _)| depth + dz < nearest) {
-                        *pixel = Some((depth + dz, piece.normal));
-                    }
-                }
-            }
-        }
-        picture
-    }
-}
-
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
     use crate::numeric::rng::Rng;
+    use crate::numeric::vector::normalize;
 
-    fn disc(centre: Vec3, normal: Vec3, radius: f64, error: f64) -> Splat {
+    pub fn disc(centre: Vec3, normal: Vec3, radius: f64, error: f64) -> Splat {
         let side = if normal[0].abs() < 0.5 {
             [1.0, 0.0, 0.0]
         } else {
@@ -713,54 +498,5 @@ mod tests {
             let over = wanted.iter().filter(|h| h.is_none_or(|h| h > 0.1)).count();
             assert!(found.over_bound <= over as u64 && found.over_bound >= missed);
         }
-    }
-
-    #[test]
-    fn a_missing_disc_is_found_by_points_and_by_views() {
-        let grid = |i: i32| [f64::from(i % 20), f64::from(i / 20), 0.0];
-        let positions: Vec<Vec3> = (0..400).map(grid).collect();
-        let up = [0.0, 0.0, 1.0];
-        let all: Vec<Splat> = positions.iter().map(|p| disc(*p, up, 0.75, 0.0)).collect();
-        let pieces: Vec<Piece> = positions
-            .iter()
-            .map(|p| Piece {
-                centre: *p,
-                normal: up,
-                radius: 0.75,
-            })
-            .collect();
-        let found = Piece::around(&positions, 8);
-        assert_eq!(found.len(), 400);
-        // Eight neighbours up to the diagonal of a square share out their disc.
-        let radius = (2.0 * std::f64::consts::PI / 8.0 / 2.0).sqrt();
-        assert!(
-            (found[210].radius - radius).abs() < 1e-12,
-            "{:?}",
-            found[210]
-        );
-        assert!(found.iter().all(|p| p.normal[2].abs() > 1.0 - 1e-12));
-        let views = Views {
-            count: 6,
-            pixels: 200,
-        };
-        let found = coverage(&positions, &all, 0.0, Some(&vec![up; 400]));
-        assert_eq!((found.uncovered, found.over_bound), (0, 0));
-        assert_eq!(found.max_distance, Some(0.0));
-        assert_eq!(found.normal_max_deg, Some(0.0));
-        let truth = Truth::Pieces(&pieces);
-        let whole = holes(&truth, &all, 0.1, views);
-        assert!(whole.holes == 0 && whole.seen > 1000, "{whole:?}");
-        let mut some = all.clone();
-        some.remove(210);
-        let found = coverage(&positions, &some, 0.0, None);
-        assert_eq!((found.uncovered, found.first_uncovered), (1, Some(210)));
-        let gap = found.max_distance.expect("a distance");
-        assert!((gap - 0.25).abs() < 1e-12, "{gap}");
-        let open = holes(&truth, &some, 0.1, views);
-        assert!(open.holes > 0 && open.seen == whole.seen, "{open:?}");
-        // A disc that is there but too far behind fills no hole.
-        some.push(disc([10.0, 10.0, -1.0], up, 0.75, 0.0));
-        some.push(disc([10.0, 10.0, 1.0], up, 0.0, 0.0));
-        assert!(holes(&truth, &some, 0.1, views).holes > 0);
     }
 }

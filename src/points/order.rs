@@ -2,64 +2,12 @@
 
 use crate::mesh::Mesh;
 use crate::numeric::vector::{Vec3, sub};
-use crate::spatial::aabb::Aabb;
-use crate::spatial::local::{exponent_above, times_power_of_two};
+use crate::spatial::local::CornerFrame;
 use rayon::prelude::*;
 use std::cmp::Ordering;
 
 /// Bits of a Morton key along each axis.
 const BITS: u32 = 21;
-
-/// The way to coordinates in which the cloud's box starts at 0 and its longest side is from 1/2 to 1.
-///
-/// The difference from the box's corner moves with the cloud, and scaling by powers of two is exact:
-/// what is left depends on neither place nor size.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Local {
-    origin: Vec3,
-    exponent: i32,
-}
-
-impl Local {
-    /// The frame of points in this box, which is finite.
-    pub fn of(bounds: Aabb) -> Self {
-        // Half the extent does not overflow where the extent would.
-        let half = (0..3)
-            .map(|a| bounds.hi[a] * 0.5 - bounds.lo[a] * 0.5)
-            .fold(0.0, f64::max);
-        Local {
-            origin: if bounds.is_empty() {
-                [0.0; 3]
-            } else {
-                bounds.lo
-            },
-            exponent: if half > 0.0 {
-                exponent_above(half) + 1
-            } else {
-                0
-            },
-        }
-    }
-
-    /// A point of the cloud in local coordinates.
-    #[inline]
-    pub fn point(&self, p: Vec3) -> Vec3 {
-        // Halves, as the difference may overflow where the result does not; and 0 has one sign.
-        std::array::from_fn(|a| {
-            times_power_of_two(p[a] * 0.5 - self.origin[a] * 0.5, 1 - self.exponent) + 0.0
-        })
-    }
-
-    /// A length of the cloud in local coordinates.
-    pub fn length(&self, length: f64) -> f64 {
-        times_power_of_two(length, -self.exponent)
-    }
-
-    /// A local length in the cloud's unit.
-    pub fn length_back(&self, length: f64) -> f64 {
-        times_power_of_two(length, self.exponent)
-    }
-}
 
 /// The distinct points of a cloud in local coordinates, along Morton's curve.
 ///
@@ -67,7 +15,7 @@ impl Local {
 #[derive(Debug, Clone)]
 pub struct Ordered {
     /// The frame of the coordinates.
-    pub local: Local,
+    pub local: CornerFrame,
     /// Coordinates in that frame.
     pub points: Vec<Vec3>,
     /// The index of each in the cloud.
@@ -80,8 +28,8 @@ impl Ordered {
     /// Cost: one sort. Source: Morton, "A computer oriented geodetic data base", 1966; points of one
     /// cell of 2^-21 of the longest side are in the order of their coordinates.
     pub fn of(cloud: &Mesh) -> Self {
-        let local = Local::of(cloud.bounds());
-        let place = |index: u32| local.point(cloud.positions[index as usize]);
+        let local = CornerFrame::around(cloud.bounds());
+        let place = |index: u32| local.to_local(cloud.positions[index as usize]);
         let mut keys: Vec<(u64, u32)> = (0..cloud.positions.len() as u32)
             .into_par_iter()
             .map(|index| (morton(place(index)), index))

@@ -4,7 +4,7 @@ use crate::camera::{Camera, Lens, Size};
 use crate::error::{Error, Fault, Result};
 use crate::numeric::vector::{Vec3, add, cross, length, normalize, scale, sub};
 use crate::spatial::aabb::Aabb;
-use crate::spatial::local::{exponent_above, times_power_of_two};
+use crate::spatial::local::CornerFrame;
 use schemars::JsonSchema;
 use serde::Serialize;
 
@@ -39,8 +39,8 @@ impl View {
     }
 
     /// The camera in a frame; errs where it is too far away for its coordinates.
-    pub(super) fn camera(&self, local: &Local) -> Result<Camera> {
-        let (eye, target) = (local.point(self.eye), local.point(self.target));
+    pub(super) fn camera(&self, local: &CornerFrame) -> Result<Camera> {
+        let (eye, target) = (local.to_local(self.eye), local.to_local(self.target));
         if !is_near(eye) || !is_near(target) {
             return Err(self.wrong(TOO_FAR));
         }
@@ -103,7 +103,7 @@ impl From<View> for Shot {
 
 impl Shot {
     /// What a camera in a frame sees, in the file's unit.
-    pub(super) fn of(camera: &Camera, local: &Local) -> Shot {
+    pub(super) fn of(camera: &Camera, local: &CornerFrame) -> Shot {
         let Camera {
             target,
             unit,
@@ -113,11 +113,11 @@ impl Shot {
         } = *camera;
         let (fov_deg, height) = match lens {
             Lens::Perspective { fov_y } => (Some(fov_y.to_degrees()), None),
-            Lens::Orthographic { height } => (None, Some(local.length_back(height * unit))),
+            Lens::Orthographic { height } => (None, Some(local.length_from_local(height * unit))),
         };
         Shot {
-            eye: local.point_back(add(target, scale(axes[2], distance * unit))),
-            target: local.point_back(target),
+            eye: local.from_local(add(target, scale(axes[2], distance * unit))),
+            target: local.from_local(target),
             up: axes[1],
             fov_deg,
             height,
@@ -125,62 +125,18 @@ impl Shot {
     }
 }
 
-/// The way to coordinates in which the model's box starts at 0 and its longest side is from 1/2 to 1.
+/// The frame of points in a box, each with something this long around it; errs where that overflows.
 ///
-/// The difference from the box's corner moves with the model, and scaling by powers of two is exact:
-/// what is left depends on neither place nor size.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Local {
-    origin: Vec3,
-    exponent: i32,
-}
-
-impl Local {
-    /// The frame of a model with these bounds; errs where their extent overflows.
-    pub fn around(bounds: Aabb) -> Result<Local> {
-        Local::with_margin(bounds, 0.0)
+/// The margin moves no coordinate: where points are exact, so is the frame.
+pub(super) fn frame(points: Aabb, margin: f64) -> Result<CornerFrame> {
+    let longest = points.extent().into_iter().fold(0.0, f64::max) + 2.0 * margin;
+    if !longest.is_finite() {
+        return Err(Error::Geometry(Fault::whole(format!(
+            "the model spans {:?} to {:?}: its extent overflows",
+            points.lo, points.hi
+        ))));
     }
-
-    /// The frame of points in a box, each with something this long around it; errs where that overflows.
-    ///
-    /// The margin moves no coordinate: where points are exact, so is the frame.
-    pub fn with_margin(points: Aabb, margin: f64) -> Result<Local> {
-        let longest = points.extent().into_iter().fold(0.0, f64::max) + 2.0 * margin;
-        if !longest.is_finite() {
-            return Err(Error::Geometry(Fault::whole(format!(
-                "the model spans {:?} to {:?}: its extent overflows",
-                points.lo, points.hi
-            ))));
-        }
-        Ok(Local {
-            origin: if points.is_empty() {
-                [0.0; 3]
-            } else {
-                points.lo
-            },
-            exponent: if longest > 0.0 {
-                exponent_above(longest)
-            } else {
-                0
-            },
-        })
-    }
-
-    pub fn point(&self, p: Vec3) -> Vec3 {
-        sub(p, self.origin).map(|c| times_power_of_two(c, -self.exponent))
-    }
-
-    pub fn length(&self, length: f64) -> f64 {
-        times_power_of_two(length, -self.exponent)
-    }
-
-    pub fn point_back(&self, p: Vec3) -> Vec3 {
-        add(p.map(|c| self.length_back(c)), self.origin)
-    }
-
-    pub fn length_back(&self, length: f64) -> f64 {
-        times_power_of_two(length, self.exponent)
-    }
+    Ok(CornerFrame::with_margin(points, margin))
 }
 
 /// Whether products of local coordinates like these stay far from overflow.

@@ -76,6 +76,76 @@ impl LocalFrame {
     }
 }
 
+/// A frame in which the corner of a model's box is at 0 and its longest side is from 1/2 to 1.
+///
+/// The difference from the corner moves with the model, and scaling by powers of two is exact: what
+/// is left depends on neither place nor size, and where the differences are exact, on nothing else.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct CornerFrame {
+    origin: Vec3,
+    exponent: i32,
+}
+
+impl CornerFrame {
+    /// The frame of points in this box, which is finite; the identity for an empty one.
+    pub fn around(bounds: Aabb) -> Self {
+        CornerFrame::with_margin(bounds, 0.0)
+    }
+
+    /// The frame of points in this box of which each has something so long around it: the corner is
+    /// that of the points, the longest side with the margin is from 1/2 to 1.
+    pub fn with_margin(points: Aabb, margin: f64) -> Self {
+        let side = |of: fn(f64, f64) -> f64| {
+            let sides = (0..3).map(|a| of(points.hi[a], points.lo[a]));
+            sides.fold(0.0, f64::max)
+        };
+        let longest = side(|hi, lo| hi - lo) + 2.0 * margin;
+        // Half the extent does not overflow where the extent does.
+        let half = side(|hi, lo| hi * 0.5 - lo * 0.5) + margin;
+        let exponent = match longest {
+            0.0 => 0,
+            _ if longest.is_finite() => exponent_above(longest),
+            _ => exponent_above(half) + 1,
+        };
+        CornerFrame {
+            origin: match points.is_empty() {
+                true => [0.0; 3],
+                false => points.lo,
+            },
+            exponent,
+        }
+    }
+
+    /// A point of the model in local coordinates.
+    #[inline]
+    pub fn to_local(&self, p: Vec3) -> Vec3 {
+        std::array::from_fn(|a| {
+            let difference = p[a] - self.origin[a];
+            // Halves where the difference overflows and the result does not; and 0 has one sign.
+            if difference.is_finite() {
+                times_power_of_two(difference, -self.exponent) + 0.0
+            } else {
+                times_power_of_two(p[a] * 0.5 - self.origin[a] * 0.5, 1 - self.exponent)
+            }
+        })
+    }
+
+    /// The point of the model with these local coordinates.
+    pub fn from_local(&self, p: Vec3) -> Vec3 {
+        add(p.map(|c| self.length_from_local(c)), self.origin)
+    }
+
+    /// A length of the model in the local unit.
+    pub fn length_to_local(&self, length: f64) -> f64 {
+        times_power_of_two(length, -self.exponent)
+    }
+
+    /// A local length in the model's unit.
+    pub fn length_from_local(&self, length: f64) -> f64 {
+        times_power_of_two(length, self.exponent)
+    }
+}
+
 /// The smallest `e` with `value < 2^e`, for a positive finite value.
 pub fn exponent_above(value: f64) -> i32 {
     let biased = |v: f64| (v.to_bits() >> 52 & 0x7ff) as i32;
@@ -143,6 +213,39 @@ mod tests {
                 );
             }
         }
+    }
+
+    #[test]
+    fn a_corner_frame_depends_on_neither_place_nor_size() {
+        for (lo, hi, scale, shift) in [
+            (0.0, 3.0, 2f64.powi(-1000), 0.0),
+            (0.0, 3.0, 1.0, 4096.0),
+            (0.0, 3.0, 2f64.powi(1000), 0.0),
+            (-1.5e308, 1.5e308, 1.0, 0.0),
+            (0.0, 3.0, 5e-324, 0.0),
+        ] {
+            let [lo, hi] = [lo, hi].map(|c| c * scale + shift);
+            let frame = CornerFrame::around(Aabb {
+                lo: [lo; 3],
+                hi: [hi; 3],
+            });
+            let side = frame.to_local([hi; 3])[0];
+            assert!((0.5..=1.0).contains(&side), "{lo:e} to {hi:e} gives {side}");
+            assert_eq!(frame.to_local([lo; 3]), [0.0; 3]);
+            if (hi - lo).is_finite() {
+                assert_eq!(side, 0.75);
+                assert_eq!(frame.from_local([side; 3]), [hi; 3]);
+                assert_eq!(frame.length_from_local(frame.length_to_local(hi)), hi);
+            }
+        }
+        let wide = CornerFrame::with_margin(
+            Aabb {
+                lo: [1.0; 3],
+                hi: [2.0; 3],
+            },
+            3.25,
+        );
+        assert_eq!(wide.to_local([1.0, 2.0, 9.0]), [0.0, 0.125, 1.0]);
     }
 
     #[test]

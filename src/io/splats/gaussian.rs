@@ -28,18 +28,23 @@ const EDGE: f64 = 1.0 / 510.0;
 const THINNEST: f64 = 1e-3;
 /// What is told from a circle.
 const ROUND: f64 = 1e-3;
+/// The direction of a lamp at the left, in front and above, whether y or z is up.
+const LAMP: Vec3 = [-2.0 / 7.0, 6.0 / 7.0, 3.0 / 7.0];
 /// The comment that names the place of the origin.
 const ORIGIN: &str = "origin";
 
 /// Writes discs as Gaussians: position, normal, colour, opacity, scales and rotation.
 ///
-/// Field, counts and classes have no place in it; discs without colours are light grey. Cost: linear.
+/// Field, counts and classes have no place in it. Viewers have no light: discs without colours are grey
+/// as a lamp at the upper left makes them, or nothing but an outline would be seen. Cost: linear.
 pub fn write(splats: &Splats, out: &mut dyn Write) -> io::Result<()> {
     let origin = origin_of(splats);
     let mut bytes = header(splats, origin).into_bytes();
-    let grey = [0.8, 0.8, 0.8, 1.0];
     for (i, splat) in splats.splats.iter().enumerate() {
-        let color = splats.colors.as_ref().map_or(grey, |colors| colors[i]);
+        let color = splats
+            .colors
+            .as_ref()
+            .map_or_else(|| lit(splat.normal), |colors| colors[i]);
         let [red, green, blue, alpha] = color.map(f64::from);
         let direct = [red, green, blue].map(|c| (c - 0.5) / HARMONIC);
         let alpha = alpha.clamp(EDGE, 1.0 - EDGE);
@@ -55,6 +60,13 @@ pub fn write(splats: &Splats, out: &mut dyn Write) -> io::Result<()> {
         spill(&mut bytes, out)?;
     }
     out.write_all(&bytes)
+}
+
+/// The grey of a surface under a lamp; its dark side is not black.
+fn lit(normal: Vec3) -> [f32; 4] {
+    let light = 0.5 + 0.5 * dot(normal, LAMP);
+    let grey = (0.2 + 0.7 * light) as f32;
+    [grey, grey, grey, 1.0]
 }
 
 fn header(splats: &Splats, origin: Vec3) -> String {

@@ -42,10 +42,11 @@ use crate::error::{Error, Fault, Result};
 use crate::mesh::Mesh;
 use crate::numeric::vector::{add, scale};
 use crate::points::normals::Neighbourhoods;
-use crate::points::order::{Local, Ordered};
+use crate::points::order::Ordered;
 use crate::progress::Progress;
 use crate::spatial::aabb::Aabb;
 use crate::spatial::kdtree::KdTree;
+use crate::spatial::local::CornerFrame;
 use field::Field;
 use grow::{Bounds, Cloud, Growth};
 use prepare::{Prepared, prepare};
@@ -172,16 +173,16 @@ impl<'a> Maker<'a> {
         let i = growth.source as usize;
         let source = self.ordered.sources[i];
         let normal = known.normals[i];
-        let step = scale(normal, local.length_back(growth.offset));
+        let step = scale(normal, local.length_from_local(growth.offset));
         self.splats.splats.push(Splat {
             centre: add(self.cloud.positions[source as usize], step),
             normal,
             tangent: field.tangent,
-            radius: local.length_back(growth.radius),
+            radius: local.length_from_local(growth.radius),
             field: field.centre,
             // Per local length: the other way than a length.
-            slopes: field.slopes.map(|s| local.length(s)),
-            error: local.length_back(growth.error),
+            slopes: field.slopes.map(|s| local.length_to_local(s)),
+            error: local.length_from_local(growth.error),
             count: growth.covered.len() as u32,
             source,
         });
@@ -222,9 +223,9 @@ fn majority(values: impl Iterator<Item = u8>) -> u8 {
 }
 
 /// A length in local coordinates, where the diagonal is known in them.
-fn local_length(length: Length, local: &Local, diagonal: f64) -> f64 {
+fn local_length(length: Length, local: &CornerFrame, diagonal: f64) -> f64 {
     match length {
-        Length::Absolute(length) => local.length(length),
+        Length::Absolute(length) => local.length_to_local(length),
         Length::OfDiagonal(_) => length.of(diagonal),
     }
 }
@@ -249,7 +250,7 @@ fn stats(
         splats: splats.len() as u64,
         ratio: share(splats.len() as f64, count as u64),
         delta: Delta {
-            abs: local.length_back(delta),
+            abs: local.length_from_local(delta),
             diag: (diagonal > 0.0).then(|| delta / diagonal),
         },
         k: params.neighbors as u64,

@@ -149,7 +149,7 @@ fn turn(
     match orient {
         Orient::Mst => return by_tree(tree, &ordered.points, normals, near),
         Orient::Viewpoint(place) => {
-            to_viewpoint(&ordered.points, normals, ordered.local.point(place));
+            to_viewpoint(&ordered.points, normals, ordered.local.to_local(place));
         }
         Orient::Keep => upwards(normals),
     }

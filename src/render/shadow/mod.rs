@@ -22,7 +22,7 @@ pub use params::{Light, MOST_RAYS, Method, Near, Params, REFERENCE_RAYS};
 pub use stats::{Stats, Verified};
 pub use trade::TRADE;
 
-use super::view::{Local, is_near, upper_left};
+use super::view::{frame, is_near, upper_left};
 use crate::camera::{Camera, Size, THREE_QUARTER};
 use crate::error::{Error, Fault, Result};
 use crate::image::raster::Raster;
@@ -32,6 +32,7 @@ use crate::numeric::vector::{Vec3, add, cross, normalize, scale, sub};
 use crate::progress::Progress;
 use crate::report::{Modelled, Warning};
 use crate::spatial::aabb::Aabb;
+use crate::spatial::local::CornerFrame;
 use crate::volume::octree::RayTree;
 use crate::volume::voxelize::{self, Lazy, Mode, voxelize};
 use crate::volume::{Data, Volume};
@@ -101,7 +102,7 @@ pub fn bake(mesh: &Mesh, params: &Params, progress: &dyn Progress) -> Result<(Me
 
 /// The mesh in local coordinates, its triangles laid out for rays, and its voxels.
 struct Model {
-    local: Local,
+    local: CornerFrame,
     /// Triangles alone; vertices that none uses are put where one is that is used.
     mesh: Mesh,
     tracer: Tracer,
@@ -135,8 +136,8 @@ impl Model {
             .map_or(THREE_QUARTER, |view| sub(view.eye, view.target));
         let framing = Camera::framing(&bounds, direction, up, 1.0);
         let given = params.lights.iter().map(|light| Light {
-            centre: local.point(light.centre),
-            radius: local.length(light.radius),
+            centre: local.to_local(light.centre),
+            radius: local.length_to_local(light.radius),
         });
         let mut lights: Vec<Light> = given.collect();
         for (light, asked) in lights.iter().zip(&params.lights) {
@@ -204,8 +205,8 @@ impl Model {
     fn stats(&self, params: &Params, caster: &Caster, tally: Tally) -> Stats {
         let lights: Vec<Light> = if params.lights.is_empty() {
             let back = |light: &Light| Light {
-                centre: self.local.point_back(light.centre),
-                radius: self.local.length_back(light.radius),
+                centre: self.local.from_local(light.centre),
+                radius: self.local.length_from_local(light.radius),
             };
             self.lights.iter().map(back).collect()
         } else {
@@ -215,7 +216,7 @@ impl Model {
         let (set_voxels, modelled) = self.made(caster);
         let voxels = caster.grid().map(|grid| stats::Voxels {
             dims: grid.lattice.dims.map(|d| d as u64),
-            spacing: self.local.length_back(grid.lattice.h),
+            spacing: self.local.length_from_local(grid.lattice.h),
             set_voxels,
             nodes_visited: tally.visits.nodes,
             voxels_visited: tally.visits.voxels,
@@ -281,19 +282,19 @@ impl Model {
 }
 
 /// The triangles of a mesh in local coordinates.
-fn localized(mesh: &Mesh) -> Result<(Local, Mesh)> {
+fn localized(mesh: &Mesh) -> Result<(CornerFrame, Mesh)> {
     let mut used = vec![false; mesh.positions.len()];
     for v in mesh.triangles.iter().flatten() {
         used[*v as usize] = true;
     }
     let of_triangles = mesh.positions.iter().zip(&used);
     let bounds = Aabb::around(of_triangles.filter(|(_, used)| **used).map(|(p, _)| p));
-    let local = Local::around(bounds)?;
+    let local = frame(bounds, 0.0)?;
     let first = mesh
         .triangles
         .first()
         .map_or([0.0; 3], |t| mesh.positions[t[0] as usize]);
-    let place = |(p, used): (&Vec3, &bool)| local.point(if *used { *p } else { first });
+    let place = |(p, used): (&Vec3, &bool)| local.to_local(if *used { *p } else { first });
     let positions = mesh.positions.iter().zip(&used).map(place).collect();
     let triangles = mesh.triangles.clone();
     Ok((local, Mesh::from_triangles(positions, triangles)))

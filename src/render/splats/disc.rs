@@ -4,8 +4,8 @@ use crate::error::{Error, Fault, Result};
 use crate::image::colour::Linear;
 use crate::numeric::vector::{Vec3, add, cross, dot, length, normalize, scale, sub};
 use crate::points::{Splat, Splats};
-use crate::render::view::Local;
 use crate::spatial::aabb::Aabb;
+use crate::spatial::local::CornerFrame;
 use rayon::prelude::*;
 
 /// A ray. Its direction is of unit length, so that `t` is a distance.
@@ -117,7 +117,7 @@ pub(super) fn check(splats: &Splats) -> Result<()> {
 }
 
 impl Discs {
-    pub fn new(splats: &Splats, local: &Local) -> Discs {
+    pub fn new(splats: &Splats, local: &CornerFrame) -> Discs {
         let splats_here: Vec<Splat> = splats
             .splats
             .par_iter()
@@ -182,7 +182,7 @@ pub(super) fn to_light(v: f32) -> f32 {
 }
 
 /// A disc in the scene's frame, its axes of unit length and at right angles.
-fn localized(splat: &Splat, local: &Local) -> Splat {
+fn localized(splat: &Splat, local: &CornerFrame) -> Splat {
     let normal = normalize(splat.normal);
     let flat = sub(splat.tangent, scale(normal, dot(splat.tangent, normal)));
     // A tangent along the normal says nothing: any across will do.
@@ -192,12 +192,12 @@ fn localized(splat: &Splat, local: &Local) -> Splat {
         across(normal)
     };
     Splat {
-        centre: local.point(splat.centre),
+        centre: local.to_local(splat.centre),
         normal,
         tangent,
-        radius: local.length(splat.radius),
-        slopes: splat.slopes.map(|slope| local.length_back(slope)),
-        error: local.length(splat.error),
+        radius: local.length_to_local(splat.radius),
+        slopes: splat.slopes.map(|slope| local.length_from_local(slope)),
+        error: local.length_to_local(splat.error),
         ..*splat
     }
 }

@@ -13,8 +13,9 @@ use crate::mesh::tracer::{self, Tracer};
 use crate::numeric::vector::{Vec3, add, cross, dot, normalize, scale, sub};
 use crate::points::Splats;
 use crate::progress::Progress;
-use crate::render::view::{Local, Shot, is_near, upper_left};
+use crate::render::view::{Shot, frame, is_near, upper_left};
 use crate::spatial::aabb::Aabb;
+use crate::spatial::local::CornerFrame;
 
 /// A ball, in the file's unit.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, schemars::JsonSchema)]
@@ -109,7 +110,7 @@ pub(super) struct Lamp {
 /// Everything in one frame, ready for rays.
 #[derive(Debug)]
 pub(super) struct Stage {
-    pub local: Local,
+    pub local: CornerFrame,
     pub objects: Vec<Object>,
     pub bounds: Aabb,
     pub lamps: Vec<Lamp>,
@@ -152,12 +153,15 @@ impl Scene {
     fn check(&self) -> Result<()> {
         self.covers.iter().try_for_each(disc::check)?;
         self.spheres.iter().try_for_each(Sphere::check)?;
+        if self.materials.len() > self.objects() {
+            let problem = match self.objects() {
+                1 => "there is one object, number 0".to_owned(),
+                count => format!("there are {count} objects, counted from 0"),
+            };
+            let last = self.materials.len() - 1;
+            return Err(Error::parameter("material", last, problem));
+        }
         for (number, material) in self.materials.iter().enumerate() {
-            if number >= self.objects() {
-                let count = self.objects();
-                let problem = format!("there are {count} objects, counted from 0");
-                return Err(Error::parameter("material", number, problem));
-            }
             material
                 .check()
                 .map_err(|problem| Error::parameter("material", number, problem))?;
@@ -168,7 +172,7 @@ impl Scene {
     /// The frame of all that is drawn, and of the reference; errs where there is nothing.
     ///
     /// It is that of points alone: what stands around them rounds differently at another place.
-    pub(super) fn local(&self) -> Result<Local> {
+    pub(super) fn local(&self) -> Result<CornerFrame> {
         let discs = || self.covers.iter().flat_map(|cover| &cover.splats);
         let meshes = self.meshes.iter().chain(&self.reference).map(used_bounds);
         let centres = discs().map(|s| &s.centre);
@@ -180,7 +184,7 @@ impl Scene {
         }
         let radii = discs().map(|s| s.radius);
         let radii = radii.chain(self.spheres.iter().map(|s| s.radius));
-        Local::with_margin(points, radii.fold(0.0, f64::max))
+        frame(points, radii.fold(0.0, f64::max))
     }
 }
 
@@ -191,10 +195,10 @@ fn used_bounds(mesh: &Mesh) -> Aabb {
 }
 
 impl Triangles {
-    fn new(mesh: &Mesh, local: &Local) -> Triangles {
+    fn new(mesh: &Mesh, local: &CornerFrame) -> Triangles {
         let mut mesh = mesh.clone();
         for p in &mut mesh.positions {
-            *p = local.point(*p);
+            *p = local.to_local(*p);
         }
         Triangles {
             tracer: Tracer::new(&mesh),
@@ -319,7 +323,7 @@ impl Stage {
     }
 }
 
-fn shapes(scene: &Scene, params: &Params, local: &Local) -> Vec<Shape> {
+fn shapes(scene: &Scene, params: &Params, local: &CornerFrame) -> Vec<Shape> {
     let covers = scene.covers.iter().map(|splats| {
         let discs = Discs::new(splats, local);
         Shape::Cover(Cover::new(discs, params.accelerator))
@@ -327,19 +331,23 @@ fn shapes(scene: &Scene, params: &Params, local: &Local) -> Vec<Shape> {
     let meshes = scene.meshes.iter();
     let meshes = meshes.map(|mesh| Shape::Mesh(Box::new(Triangles::new(mesh, local))));
     let spheres = scene.spheres.iter();
-    let spheres = spheres.map(|s| Shape::Sphere(local.point(s.centre), local.length(s.radius)));
+    let spheres =
+        spheres.map(|s| Shape::Sphere(local.to_local(s.centre), local.length_to_local(s.radius)));
     covers.chain(meshes).chain(spheres).collect()
 }
 
 /// The lights in the file's unit, and where they are in the frame.
 fn placed_lights(
     params: &Params,
-    local: &Local,
+    local: &CornerFrame,
     framing: &Camera,
     bounds: Aabb,
     up: Vec3,
 ) -> Result<(Vec<Light>, Vec<Vec3>)> {
-    let places = params.lights.iter().map(|light| local.point(light.place));
+    let places = params
+        .lights
+        .iter()
+        .map(|light| local.to_local(light.place));
     let places: Vec<Vec3> = places.collect();
     if let Some(far) = places.iter().position(|place| !is_near(*place)) {
         return Err(params.lights[far].too_far());
@@ -350,7 +358,7 @@ fn placed_lights(
     let way = scale(upper_left(framing, up), 4.0 * framing.unit);
     let place = add(bounds.centre(), way);
     let light = Light {
-        place: local.point_back(place),
+        place: local.from_local(place),
         colour: [255; 3],
     };
     Ok((vec![light], vec![place]))

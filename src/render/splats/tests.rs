@@ -11,7 +11,8 @@ use crate::numeric::rng::Rng;
 use crate::numeric::vector::{add, cross, dot, length, normalize, scale, sub};
 use crate::points::{Splat, Splats};
 use crate::progress::Silent;
-use crate::render::view::{Local, View};
+use crate::render::view::View;
+use crate::spatial::local::CornerFrame;
 use crate::spatial::local::times_power_of_two;
 
 /// The unit sphere covered by discs as the paper grows them: exact slopes, the mean normal in the
@@ -81,13 +82,13 @@ fn heap(count: u64) -> Splats {
 }
 
 /// The discs with each kind of tree, and the frame they are in.
-fn covers(splats: &Splats) -> (Local, [Cover; 2]) {
+fn covers(splats: &Splats) -> (CornerFrame, [Cover; 2]) {
     let local = local(splats);
     let cover = |accelerator| Cover::new(Discs::new(splats, &local), accelerator);
     (local, [Accelerator::Bvh, Accelerator::Octree].map(cover))
 }
 
-fn local(splats: &Splats) -> Local {
+fn local(splats: &Splats) -> CornerFrame {
     let scene = Scene {
         covers: vec![splats.clone()],
         ..Scene::default()
@@ -290,7 +291,7 @@ fn what_stands_on_a_surface_is_seen_in_it() {
     for i in 0..2000 {
         let mut rng = Rng::new(3, i);
         let place = [rng.range(0.02, 1.5), 0.5, rng.range(0.3, 1.5)];
-        let down = ray(local.point(place), [0.0, -1.0, 0.0]);
+        let down = ray(local.to_local(place), [0.0, -1.0, 0.0]);
         let sight = seen(&cover, &down, Blend::Normals).expect("the floor");
         let second = Ray {
             from: Some(Origin {
@@ -320,7 +321,7 @@ fn jumps(delta: f64, side: usize) -> [f64; 2] {
         let at = [x as f64 * step - 0.85, y as f64 * step - 0.85, 3.0];
         // Where the sphere is steep, neighbours are far from each other.
         let inside = at[0] * at[0] + at[1] * at[1] < 0.64;
-        let down = ray(local.point(at), [0.0, 0.0, -1.0]);
+        let down = ray(local.to_local(at), [0.0, 0.0, -1.0]);
         inside.then(|| seen(&cover, &down, blend).expect("no holes").normal)
     };
     [Blend::Normals, Blend::None].map(|blend| {
@@ -596,7 +597,7 @@ fn shadows_lie_where_they_must_and_take_the_colours_of_lamps() {
     };
     let light = |place, colour| Light { place, colour };
     let passing = |stage: &Stage, from: Vec3, to: Vec3| {
-        let (from, to) = (stage.local.point(from), stage.local.point(to));
+        let (from, to) = (stage.local.to_local(from), stage.local.to_local(to));
         let way = sub(to, from);
         let ray = ray(from, way);
         stage.passes(&ray, length(way), &mut Visits::default())
@@ -724,10 +725,10 @@ fn what_cannot_be_drawn_is_refused_with_words() {
         "splat 3: the normal has no length"
     );
     let mut many = scene();
-    many.materials.push(Material::DEFAULT);
+    many.materials.resize(8, Material::DEFAULT);
     assert_eq!(
         refused(&many, &Params::DEFAULT),
-        "--material 3: there are 3 objects, counted from 0"
+        "--material 7: there are 3 objects, counted from 0"
     );
     many.materials.truncate(1);
     many.materials[0].transparent = 0.9;
@@ -789,13 +790,13 @@ fn backs_of_discs_at_an_outline_are_not_seen_but_those_of_open_surfaces_are() {
     for i in 0..40_000 {
         let mut rng = Rng::new(21, i);
         let place = [rng.range(-1.1, 1.1), rng.range(-1.1, 1.1), 3.0];
-        let down = ray(local.point(place), [0.0, 0.0, -1.0]);
+        let down = ray(local.to_local(place), [0.0, 0.0, -1.0]);
         if let Some(sight) = follower.see(&down) {
             let plane = cover.discs.plates[sight.item as usize].normal;
             backs += u32::from(dot(plane, down.direction) > 0.0);
             assert!(sight.is_outside(&down), "{place:?}");
         }
-        let out = ray(local.point([0.0; 3]), sub(place, [0.0, 0.0, 2.0]));
+        let out = ray(local.to_local([0.0; 3]), sub(place, [0.0, 0.0, 2.0]));
         from_within += u32::from(follower.see(&out).is_some_and(|s| !s.is_outside(&out)));
     }
     assert!(backs > 20, "{backs}");
