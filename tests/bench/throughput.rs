@@ -16,6 +16,7 @@ use serde_json::json;
 use std::io::Write;
 use std::time::Instant;
 
+mod clouds;
 mod molecules;
 mod scenes;
 mod shadows;
@@ -268,4 +269,5 @@ fn main() {
     voxelizations(&plan);
     shadows::run(&plan);
     molecules::run(&plan);
+    clouds::run(&plan);
 }

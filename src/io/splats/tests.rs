@@ -2,7 +2,7 @@ use super::*;
 use crate::error::Result as Checked;
 use crate::io::source::Source;
 use crate::io::{Content, format};
-use crate::numeric::vector::{cross, scale, sub};
+use crate::numeric::vector::{cross, dot, scale, sub};
 use crate::points::Splat;
 use crate::report::Warning;
 use proptest::prelude::*;
@@ -107,7 +107,20 @@ fn gaussians_cover_what_their_discs_do() {
     let splats = few();
     let (back, warnings) = read_any(written(&splats, write_gaussians)).expect("splats");
     assert!(warnings.is_empty(), "{warnings:?}");
-    assert_eq!(back.colors.as_ref().expect("colours")[0][..3], [0.8; 3]);
+    // Lit from above: what faces the lamp is brighter than what faces away, and all is grey.
+    let lamp = [-2.0, 6.0, 3.0].map(|c| c / 7.0);
+    for (splat, color) in splats
+        .splats
+        .iter()
+        .zip(back.colors.as_ref().expect("colours"))
+    {
+        let grey = 0.55 + 0.35 * dot(splat.normal, lamp);
+        assert!(
+            color[..3]
+                .iter()
+                .all(|c| (f64::from(*c) - grey).abs() < 1e-6)
+        );
+    }
     for (splat, back) in splats.splats.iter().zip(&back.splats) {
         // Relative to an origin nearby, single precision keeps the place.
         assert!(length(sub(splat.centre, back.centre)) < 1e-6);
