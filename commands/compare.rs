@@ -120,6 +120,8 @@ pub fn run(args: &Args) -> Result<Exit> {
             Content::Report(a) => reports(job, &a, args),
             Content::Molecule(_) => Err(no_measure(job, Kind::Molecule)),
             Content::Splats(_) => Err(no_measure(job, Kind::Splats)),
+            Content::Terrain(_) => Err(no_measure(job, Kind::Terrain)),
+            Content::Vectors(_) => Err(no_measure(job, Kind::Vectors)),
         };
         Ok(found?.check("tolerance", args.tolerance))
     })

@@ -11,9 +11,9 @@ use scantle::io::format::{Format, Kind};
 use schemars::JsonSchema;
 use serde::Serialize;
 
-/// Write a mesh, a cloud, splats, a volume, an image, a molecule or an animation in another format
+/// Write a mesh, a cloud, splats, a volume, an image, a molecule, an animation or a map in another format
 ///
-/// Vertices, faces, voxels, pixels, atoms, frames and their order stay as they are. What the output format cannot
+/// Vertices, faces, voxels, pixels, atoms, frames, heights, features and their order stay as they are. What the output format cannot
 /// hold is left out, and a warning counts it. Splats are written as polygons where the output format is
 /// one of meshes.
 #[derive(Debug, clap::Args)]
@@ -56,7 +56,7 @@ pub struct Params {
 /// What was done.
 #[derive(Debug, Serialize, JsonSchema)]
 pub struct Stats {
-    /// What was converted: `mesh`, `splats`, `volume`, `image`, `molecule` or `animation`.
+    /// What was converted: `mesh`, `splats`, `volume`, `image`, `molecule`, `animation`, `terrain` or `vectors`.
     kind: &'static str,
 }
 
@@ -93,6 +93,8 @@ fn convert(job: &mut Job, args: &Args) -> Result<Found<Params, Stats>> {
         io::Content::Image(image) => job.write_image(image)?,
         io::Content::Molecule(molecule) => job.write_molecule(molecule)?,
         io::Content::Animation(clip) => job.write_animation(clip)?,
+        io::Content::Terrain(grid) => job.write_terrain(grid)?,
+        io::Content::Vectors(layer) => job.write_vectors(layer)?,
         io::Content::Report(_) => {
             let fault = Fault::whole("holds a report (json), which is written in no other format");
             let hint = "scantle info and scantle compare take reports";

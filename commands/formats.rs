@@ -38,7 +38,8 @@ pub struct Table {
 struct Row {
     /// Its name, for `--input-format` and `--output-format`.
     name: &'static str,
-    /// What it holds: `mesh`, `volume`, `image`, `molecule`, `animation` or `report`.
+    /// What it holds: `mesh`, `volume`, `image`, `molecule`, `animation`,
+    /// `terrain`, `vectors` or `report`.
     kind: &'static str,
     /// File name extensions, the usual one first.
     extensions: &'static [&'static str],

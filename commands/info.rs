@@ -14,6 +14,7 @@ use scantle::points::Splats;
 use scantle::protein::inventory::{Inventory, inventory};
 use scantle::report::{Made, made_by};
 use scantle::volume::Volume;
+use scantle::{terrain, vector};
 use schemars::JsonSchema;
 use serde::Serialize;
 
@@ -22,8 +23,9 @@ use serde::Serialize;
 /// Counts, bounds and, of a mesh, its topology: whether it is closed, oriented and manifold. Of a
 /// cloud, what its points carry, and which are duplicates; of splats, their radii and errors. Of a
 /// volume, where it is, what is set and the range of values; of an image, its size and samples; of a
-/// molecule, its chains, residues and elements; of an animation, its frames and what of it moves. Of JSON, the documents, and which commands they are
-/// reports of.
+/// molecule, its chains, residues and elements; of an animation, its frames and what of it moves. Of a terrain, its cells, heights and
+/// reference system; of features on a map, their shapes and properties. Of JSON, the documents, and which
+/// commands they are reports of.
 #[derive(Debug, clap::Args)]
 #[command(after_long_help = EXAMPLES)]
 pub struct Args {
@@ -69,6 +71,10 @@ pub enum Stats {
     Molecule(Box<Inventory>),
     /// A mesh, or a cloud, whose vertices move.
     Animation(Motion),
+    /// Heights on a map.
+    Terrain(Box<terrain::inventory::Inventory>),
+    /// Features on a map.
+    Vectors(Box<vector::inventory::Inventory>),
     /// JSON documents.
     Report(ReportStats),
 }
@@ -206,6 +212,22 @@ fn look(job: &mut Job, params: Params) -> Result<Found<Params, Stats>> {
             );
             Stats::Animation(motion)
         }
+        Content::Terrain(grid) => {
+            job.progress().stage("count", 0);
+            let found = terrain::inventory::inventory(&grid);
+            job.warn(found.warnings());
+            if let (Some(min), Some(max)) = (found.min, found.max) {
+                summary += &format!(", {} to {} high", number(min), number(max));
+            }
+            Stats::Terrain(Box::new(found))
+        }
+        Content::Vectors(layer) => {
+            job.progress().stage("count", 0);
+            let found = vector::inventory::inventory(&layer);
+            job.warn(found.warnings());
+            summary += &shapes_in_words(&found);
+            Stats::Vectors(Box::new(found))
+        }
         Content::Report(documents) => {
             let reports = made_by(&documents);
             summary += &made_in_words(&reports);
@@ -246,6 +268,20 @@ fn chains_in_words(inventory: &Inventory) -> String {
         text += &format!(", and {} more kinds", inventory.hetero.len() - NAMED);
     }
     text
+}
+
+/// `, 345 of lines, 2 of polygons`.
+fn shapes_in_words(found: &vector::inventory::Inventory) -> String {
+    let kinds = [
+        (found.points[0], "of points"),
+        (found.lines[0], "of lines"),
+        (found.polygons[0], "of polygons"),
+        (found.empty, "empty"),
+    ];
+    let kinds = kinds.into_iter().filter(|(count, _)| *count > 0);
+    kinds
+        .map(|(count, what)| format!(", {count} {what}"))
+        .collect()
 }
 
 /// `, normals, 3 classes`.

@@ -21,6 +21,8 @@ use scantle::points::Splats;
 use scantle::progress::Progress;
 use scantle::protein::Molecule;
 use scantle::report::{Input, Output, Report, Run, SCHEMA, Stage, Warning};
+use scantle::terrain::Grid;
+use scantle::vector::Layer;
 use scantle::volume::Volume;
 use serde::Serialize;
 use serde_json::Value;
@@ -168,6 +170,18 @@ impl<'a> Job<'a> {
     /// Reads the next input, which must be an animation.
     pub fn read_animation(&mut self) -> Result<Clip> {
         self.read_with(io::read_animation)
+    }
+
+    /// Reads the next input, which must be heights on a map; see [`io::read_terrain`] for `cell`.
+    #[allow(dead_code)]
+    pub fn read_terrain(&mut self, cell: Option<[f64; 2]>) -> Result<Grid> {
+        self.read_with(|source, format| io::read_terrain(source, format, cell))
+    }
+
+    /// Reads the next input, which must be features on a map.
+    #[allow(dead_code)]
+    pub fn read_vectors(&mut self) -> Result<Layer> {
+        self.read_with(io::read_vectors)
     }
 
     /// Reads the next input, which must be JSON.
@@ -342,6 +356,20 @@ impl<'a> Job<'a> {
     pub fn write_animation(&mut self, clip: &Clip) -> Result<()> {
         self.write_with(Kind::Animation, |sink, format| {
             io::write_animation(clip, sink, format)
+        })
+    }
+
+    /// Writes the result, if the user wants it.
+    pub fn write_terrain(&mut self, grid: &Grid) -> Result<()> {
+        self.write_with(Kind::Terrain, |sink, format| {
+            io::write_terrain(grid, sink, format)
+        })
+    }
+
+    /// Writes the result, if the user wants it.
+    pub fn write_vectors(&mut self, layer: &Layer) -> Result<()> {
+        self.write_with(Kind::Vectors, |sink, format| {
+            io::write_vectors(layer, sink, format).map(|outputs| (outputs, Vec::new()))
         })
     }
 

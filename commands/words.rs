@@ -31,6 +31,8 @@ pub fn content(content: &Content) -> String {
         (content.residues, "residue", "residues"),
         (content.models, "model", "models"),
         (content.frames, "frame", "frames"),
+        (content.features, "feature", "features"),
+        (content.places, "place", "places"),
         (content.documents, "document", "documents"),
     ];
     for (count, one, many) in counts {
@@ -46,6 +48,13 @@ pub fn content(content: &Content) -> String {
         let (channels, bits) = (content.channels.unwrap_or(0), content.bits.unwrap_or(0));
         let channels = counted(channels, "channel", "channels");
         parts.push(format!("{x} x {y} pixels, {channels} of {bits} bits"));
+    }
+    if let Some([x, y]) = content.cells {
+        let sample = content.sample_type.as_deref().unwrap_or("unknown type");
+        parts.push(format!("{x} x {y} heights of {sample}"));
+    }
+    if let Some(crs) = &content.crs {
+        parts.push(crs.chars().flat_map(char::escape_debug).collect());
     }
     parts.join(", ")
 }

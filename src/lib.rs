@@ -11,9 +11,9 @@
 //! | 0 | [`error`] [`progress`] [`report`] [`trade`] |
 //! | 1 | [`numeric`] |
 //! | 2 | [`spatial`] [`image`] |
-//! | 3 | [`mesh`] [`points`] [`camera`] |
+//! | 3 | [`mesh`] [`points`] [`vector`] [`camera`] |
 //! | 4 | [`volume`] |
-//! | 5 | [`render`] [`protein`] [`anim`] |
+//! | 5 | [`render`] [`terrain`] [`protein`] [`anim`] |
 //! | 6 | [`measure`] [`io`] (used by commands alone) |
 #![deny(clippy::print_stdout, clippy::print_stderr)]
 
@@ -31,5 +31,7 @@ pub mod protein;
 pub mod render;
 pub mod report;
 pub mod spatial;
+pub mod terrain;
 pub mod trade;
+pub mod vector;
 pub mod volume;

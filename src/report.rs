@@ -121,6 +121,21 @@ pub struct Content {
     /// Documents of a JSON file.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub documents: Option<u64>,
+    /// Features on a map.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub features: Option<u64>,
+    /// Places of the points, lines and rings of features.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub places: Option<u64>,
+    /// Cells along a row and rows of a terrain.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub cells: Option<[u64; 2]>,
+    /// The coordinate reference system, where the file says it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub crs: Option<String>,
+    /// Smallest and largest coordinate on a map: `[[x, y], [x, y]]`, null when there is none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub extent: Option<[[f64; 2]; 2]>,
     /// Smallest and largest coordinate: `[[x, y, z], [x, y, z]]`, null when there is none.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub bounds: Option<[[f64; 3]; 2]>,

@@ -8,7 +8,8 @@ use scantle::io::format::{Format, Kind};
 use scantle::io::sink::Sink;
 use scantle::io::source::Source;
 use scantle::io::{
-    read_mesh, read_molecule, write_mesh, write_molecule, write_splats, write_volume,
+    read_mesh, read_molecule, write_mesh, write_molecule, write_splats, write_terrain,
+    write_vectors, write_volume,
 };
 use scantle::mesh::{Mesh, shapes};
 use scantle::numeric::vector::{add, cross, dot, length, normalize, scale, sub};
@@ -16,6 +17,9 @@ use scantle::points::{Splat, Splats, splat};
 use scantle::progress::Silent;
 use scantle::protein::builder::{Builder, Place};
 use scantle::protein::{Atom, Element, Molecule, Name};
+use scantle::terrain::{Grid, Samples, Transform};
+use scantle::vector::crs::Crs;
+use scantle::vector::{Feature, Layer, Polygon, Shape};
 use scantle::volume::isosurface::{Border, Select, at_level, axis_of, extract};
 use scantle::volume::{Data, Frame, Volume};
 use std::fs;
@@ -110,6 +114,105 @@ const MOLECULES: &[Row<Molecule>] = &[
     ("molecules/porthole.xyzr", portholes),
     ("molecules/nanometres.xyzr", portholes_in_nanometres),
 ];
+
+const TERRAINS: &[Row<Grid>] = &[
+    ("terrain/hills.tif", hills_on_a_map),
+    ("terrain/hills.asc", hills_on_a_map),
+    ("terrain/nothing.tif", || Grid {
+        samples: Samples::I16(vec![-9999; 48 * 32]),
+        ..hills_on_a_map()
+    }),
+];
+
+const LAYERS: &[Row<Layer>] = &[("vectors/hills.geojson", features_on_hills)];
+
+/// 48 x 32 cells of 25 m with two hills, a valley and, in the south east, a lake without heights.
+fn hills_on_a_map() -> Grid {
+    let (columns, rows) = (48, 32);
+    let height = |at: i64| {
+        let (x, y) = (at % columns, at / columns);
+        if (x - 40).pow(2) + (y - 26).pow(2) < 12 {
+            return -9999;
+        }
+        let hill = |cx: i64, cy: i64, high: i64, wide: i64| {
+            let away = (x - cx).pow(2) + (y - cy).pow(2);
+            high * wide / (wide + away)
+        };
+        (400 + 4 * x - 3 * y + hill(12, 10, 300, 60) + hill(33, 18, 420, 40)) as i16
+    };
+    Grid {
+        columns: 48,
+        rows: 32,
+        transform: Transform::north_up([300_000.0, 6_240_800.0], [25.0, 25.0]),
+        samples: Samples::I16((0..columns * rows).map(height).collect()),
+        nodata: Some(-9999.0),
+        crs: Some(Crs::from_epsg(32734)),
+    }
+}
+
+/// A road, paths, a wood with a clearing, two fields, huts and a feature without a shape, on the hills.
+fn features_on_hills() -> Layer {
+    let at = |x: f64, y: f64| [300_000.0 + x, 6_240_000.0 + y];
+    let ring = |places: &[[f64; 2]]| places.iter().map(|[x, y]| at(*x, *y)).collect::<Vec<_>>();
+    let square = |x: f64, y: f64, side: f64| {
+        ring(&[[x, y], [x + side, y], [x + side, y + side], [x, y + side]])
+    };
+    let mut clearing = square(340.0, 480.0, 60.0);
+    clearing[1..].reverse();
+    let wood = ring(&[
+        [200.0, 400.0],
+        [480.0, 380.0],
+        [520.0, 620.0],
+        [300.0, 700.0],
+        [180.0, 560.0],
+    ]);
+    let polygon = |rings| Polygon { rings };
+    let shapes = [
+        (
+            "road",
+            Shape::Lines(vec![ring(&[
+                [-20.0, 100.0],
+                [300.0, 210.0],
+                [610.0, 420.0],
+                [1220.0, 700.0],
+            ])]),
+        ),
+        (
+            "paths",
+            Shape::Lines(vec![
+                ring(&[[300.0, 210.0], [330.0, 400.0], [310.0, 545.0]]),
+                ring(&[[610.0, 420.0], [825.0, 350.0]]),
+            ]),
+        ),
+        ("wood", Shape::Polygons(vec![polygon(vec![wood, clearing])])),
+        (
+            "fields",
+            Shape::Polygons(vec![
+                polygon(vec![square(700.0, 60.0, 150.0)]),
+                polygon(vec![square(880.0, 60.0, 150.0)]),
+            ]),
+        ),
+        (
+            "huts",
+            Shape::Points(vec![at(310.0, 545.0), at(825.0, 350.0)]),
+        ),
+        ("nowhere", Shape::Empty),
+    ];
+    let feature = |(number, (name, shape)): (usize, (&str, Shape))| Feature {
+        shape,
+        properties: [
+            ("name".to_owned(), name.into()),
+            ("number".to_owned(), number.into()),
+        ]
+        .into_iter()
+        .collect(),
+    };
+    Layer {
+        name: "hills".to_owned(),
+        crs: Some(Crs::from_epsg(32734)),
+        features: shapes.into_iter().enumerate().map(feature).collect(),
+    }
+}
 
 /// An atom as a molecule has it: its place and name in a residue, an element and a letter.
 fn atom(position: [f64; 3], name: &str, symbol: &str, hetero: bool) -> Atom {
@@ -602,6 +705,18 @@ fn made_fixtures_are_current() {
         check(name, &|sink| {
             let format = sink.format().expect("the name tells the format");
             write_molecule(&make(), sink, format).map(drop)
+        });
+    }
+    for (name, make) in TERRAINS {
+        check(name, &|sink| {
+            let format = sink.format().expect("the name tells the format");
+            write_terrain(&make(), sink, format.holding(Kind::Terrain)).map(drop)
+        });
+    }
+    for (name, make) in LAYERS {
+        check(name, &|sink| {
+            let format = sink.format().expect("the name tells the format");
+            write_vectors(&make(), sink, format).map(drop)
         });
     }
     assert!(stale.is_empty(), "{stale:?} are not what the formula makes");

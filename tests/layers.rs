@@ -23,6 +23,7 @@ const MAY_USE: &[(&str, &[&str])] = &[
             "error", "mesh", "numeric", "progress", "report", "spatial", "trade",
         ],
     ),
+    ("vector", &["error", "numeric", "report", "spatial"]),
     ("camera", &["numeric", "spatial"]),
     (
         "volume",
@@ -50,10 +51,17 @@ const MAY_USE: &[(&str, &[&str])] = &[
         ],
     ),
     (
+        "terrain",
+        &[
+            "camera", "error", "image", "mesh", "numeric", "progress", "render", "report",
+            "spatial", "trade", "vector",
+        ],
+    ),
+    (
         "measure",
         &[
             "anim", "error", "image", "mesh", "numeric", "points", "progress", "protein", "report",
-            "spatial", "trade", "volume",
+            "spatial", "terrain", "trade", "vector", "volume",
         ],
     ),
     // Data types only: a reader calls no algorithm.
@@ -61,7 +69,7 @@ const MAY_USE: &[(&str, &[&str])] = &[
         "io",
         &[
             "anim", "error", "image", "mesh", "numeric", "points", "protein", "report", "spatial",
-            "volume",
+            "terrain", "vector", "volume",
         ],
     ),
 ];

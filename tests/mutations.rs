@@ -86,6 +86,22 @@ const MADE: &[(&str, &str)] = &[
         "a.gaussians",
         "convert fixtures/clouds/splats.ply -o a.gaussians --output-format gaussians",
     ),
+    (
+        "a.geotiff",
+        "convert fixtures/terrain/hills.asc -o a.geotiff --output-format geotiff",
+    ),
+    (
+        "b.geotiff",
+        "convert fixtures/terrain/gdal-tiled-lzw.tif -o b.geotiff --output-format geotiff",
+    ),
+    (
+        "a.ascii-grid",
+        "convert fixtures/terrain/hills.tif -o a.ascii-grid --output-format ascii-grid",
+    ),
+    (
+        "a.geojson",
+        "convert fixtures/vectors/parcels.shp -o a.geojson",
+    ),
 ];
 
 /// Files that are read but not written like this.
@@ -118,6 +134,16 @@ const WRITTEN: &[(&str, &str)] = &[
         "REMARK   1 PQR\nATOM      1  N   GLY A   1       0.000   0.000   0.000  0.2943 1.8240\n\
          ATOM      2  CA  GLY A   1       1.450   0.000   0.000 -0.0100 1.9080\nTER\n\
          HETATM    3 ZN   ZN      2       5.000   0.000   0.000  2.0000 1.1000\nEND\n",
+    ),
+    (
+        "text.wkt-csv",
+        "wkt,name\n\"LINESTRING(0 0, 1 1)\",a\n\"POLYGON((0 0, 4 0, 4 4, 0 0), (1 1, 2 1, 2 2, 1 1))\",b\n\
+         \"MULTIPOINT((1 2), 3 4)\",\n",
+    ),
+    (
+        "text.gpx",
+        "<gpx version=\"1.1\"><wpt lat=\"47.5\" lon=\"8\"><name>Hut</name></wpt><trk><trkseg>\
+         <trkpt lat=\"1\" lon=\"2\"/><trkpt lat=\"3\" lon=\"4\"><ele>5</ele></trkpt></trkseg></trk></gpx>",
     ),
     (
         "text.json",

@@ -18,6 +18,10 @@ pub enum Kind {
     Molecule,
     /// A mesh, or a cloud, whose vertices move.
     Animation,
+    /// Heights on a map.
+    Terrain,
+    /// Features on a map.
+    Vectors,
     /// What commands report, or any other JSON documents.
     Report,
 }
@@ -32,6 +36,8 @@ impl Kind {
             Kind::Image => "image",
             Kind::Molecule => "molecule",
             Kind::Animation => "animation",
+            Kind::Terrain => "terrain",
+            Kind::Vectors => "vectors",
             Kind::Report => "report",
         }
     }
@@ -45,6 +51,8 @@ impl Kind {
             Kind::Image => "an image",
             Kind::Molecule => "a molecule",
             Kind::Animation => "an animation",
+            Kind::Terrain => "a terrain",
+            Kind::Vectors => "features on a map",
             Kind::Report => "a report",
         }
     }
@@ -115,6 +123,20 @@ pub enum Format {
     Mdd,
     /// scantle's stream of an animation.
     Sanim,
+    /// Heights on a map, in TIFF.
+    GeoTiff,
+    /// Heights on a map, of words.
+    AsciiGrid,
+    /// Heights of a square degree.
+    Hgt,
+    /// Features on a map, in JSON.
+    GeoJson,
+    /// Features on a map, as ESRI exchanges them.
+    Shapefile,
+    /// Features on a map, in a column of well-known text.
+    WktCsv,
+    /// Way points, routes and tracks.
+    Gpx,
     /// JSON and JSON Lines.
     Json,
 }
@@ -378,6 +400,67 @@ const TABLE: &[Row] = &[
         (true, true),
         "scantle's stream of an animation, made by `compress-anim encode`",
     ),
+    Row {
+        name: "geotiff",
+        ..row(
+            Format::GeoTiff,
+            &["tif", "tiff", "gtiff"],
+            Kind::Terrain,
+            (true, true),
+            "GeoTIFF: heights in strips or tiles, and their place on a map; written in strips with deflate",
+        )
+    },
+    Row {
+        name: "ascii-grid",
+        ..row(
+            Format::AsciiGrid,
+            &["asc"],
+            Kind::Terrain,
+            (true, true),
+            "ESRI ASCII grid: heights in rows from the north, and a .prj file",
+        )
+    },
+    row(
+        Format::Hgt,
+        &["hgt"],
+        Kind::Terrain,
+        (true, false),
+        "HGT: a square degree of heights, whose name says where",
+    ),
+    row(
+        Format::GeoJson,
+        &["geojson"],
+        Kind::Vectors,
+        (true, true),
+        "GeoJSON: features of points, lines and polygons, with properties",
+    ),
+    Row {
+        name: "shapefile",
+        ..row(
+            Format::Shapefile,
+            &["shp"],
+            Kind::Vectors,
+            (true, false),
+            "ESRI shapefile, with the .dbf, .prj and .cpg files beside it",
+        )
+    },
+    Row {
+        name: "wkt-csv",
+        ..row(
+            Format::WktCsv,
+            &["csv"],
+            Kind::Vectors,
+            (true, false),
+            "columns with names, one of them of well-known text",
+        )
+    },
+    row(
+        Format::Gpx,
+        &["gpx"],
+        Kind::Vectors,
+        (true, false),
+        "GPX: way points, routes and tracks, in degrees",
+    ),
     row(
         Format::Json,
         &["json", "jsonl"],
@@ -388,7 +471,13 @@ const TABLE: &[Row] = &[
 ];
 
 /// Formats whose extension is that of another, which is the one that it tells.
-const SHARING: [Format; 3] = [Format::PointsCsv, Format::Splats, Format::Gaussians];
+const SHARING: [Format; 5] = [
+    Format::PointsCsv,
+    Format::Splats,
+    Format::Gaussians,
+    Format::AsciiGrid,
+    Format::WktCsv,
+];
 
 impl Format {
     /// All formats, in the order of the table.
@@ -465,6 +554,9 @@ impl Format {
         match (self, kind) {
             (Format::Ply, Kind::Splats) => Format::Splats,
             (Format::SpheresCsv, Kind::Mesh) => Format::PointsCsv,
+            (Format::SpheresCsv, Kind::Vectors) => Format::WktCsv,
+            (Format::Xyz, Kind::Terrain) => Format::AsciiGrid,
+            (Format::Json, Kind::Vectors) => Format::GeoJson,
             _ => self,
         }
     }

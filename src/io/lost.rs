@@ -8,6 +8,7 @@ use crate::mesh::{Mesh, Polygons};
 use crate::points::Splats;
 use crate::protein::Molecule;
 use crate::report::Warning;
+use crate::terrain::Grid;
 
 /// What of a molecule a format leaves out.
 pub fn dropped_of_molecule(molecule: &Molecule, format: Format) -> Vec<Warning> {
@@ -51,6 +52,17 @@ pub fn dropped_of_molecule(molecule: &Molecule, format: Format) -> Vec<Warning> 
         _ => {}
     }
     lost
+}
+
+/// What of a terrain a format leaves out.
+pub fn dropped_of_terrain(grid: &Grid, format: Format) -> Vec<Warning> {
+    let is_lost = format == Format::AsciiGrid && grid.crs.is_some();
+    let message = format!(
+        "{} files hold no coordinate reference system; left out",
+        format.name()
+    );
+    let lost = is_lost.then(|| Warning::new("dropped-crs", message, 1, None));
+    lost.into_iter().collect()
 }
 
 /// What of an animation a format leaves out.

@@ -3,15 +3,22 @@
 //! Readers keep what a file holds, in its order, and never repair. They refuse what a header
 //! claims but the bytes do not hold before they make room for it. A gzip layer is taken off
 //! whatever the file is called. Nothing outside the named file is read, but for the data file
-//! that a glTF, OBJ, NRRD, MetaImage or NIfTI header names in the same folder or below.
+//! that a glTF, OBJ, NRRD, MetaImage or NIfTI header names in the same folder or below, and the files
+//! that stand beside rasters and shapefiles under the same name.
 
+pub mod ascii_grid;
 mod base64;
 pub mod binvox;
 mod cloud;
 pub mod format;
 mod gather;
+pub mod geojson;
+pub mod geotiff;
 pub mod gltf;
+pub mod gpx;
 mod header;
+pub mod heights;
+pub mod hgt;
 mod holds;
 mod hybrid36;
 pub mod json;
@@ -34,10 +41,12 @@ pub mod ply;
 pub mod png;
 mod pointcache;
 pub mod pqr;
+mod prj;
 pub mod refusal;
 mod samples;
 mod sanim;
 pub mod sequence;
+pub mod shapefile;
 pub mod sink;
 mod sniff;
 pub mod source;
@@ -47,6 +56,8 @@ pub mod svo;
 mod text;
 pub mod vdb;
 pub mod vti;
+mod wkt_csv;
+mod world;
 mod xml;
 pub mod xyz;
 pub mod xyzr;
@@ -63,10 +74,12 @@ use crate::mesh::Mesh;
 use crate::points::Splats;
 use crate::protein::Molecule;
 use crate::report::{self, Input, Output, Tally, Warning};
+use crate::terrain::Grid;
+use crate::vector::{Layer, Raised};
 use crate::volume::Volume;
 use crate::volume::bits::BitGrid;
 use format::{Format, Kind};
-use lost::{dropped, dropped_of_clip, dropped_of_molecule, dropped_of_splats};
+use lost::{dropped, dropped_of_clip, dropped_of_molecule, dropped_of_splats, dropped_of_terrain};
 use refusal::Refusal;
 use serde_json::Value;
 use sink::Sink;
@@ -89,6 +102,10 @@ pub enum Content {
     Molecule(Molecule),
     /// A mesh, or a cloud, whose vertices move.
     Animation(Clip),
+    /// Heights on a map.
+    Terrain(Grid),
+    /// Features on a map.
+    Vectors(Layer),
     /// JSON documents, in the order of the file.
     Report(Vec<Value>),
 }
@@ -103,6 +120,8 @@ impl Content {
             Content::Image(_) => Kind::Image,
             Content::Molecule(_) => Kind::Molecule,
             Content::Animation(_) => Kind::Animation,
+            Content::Terrain(_) => Kind::Terrain,
+            Content::Vectors(_) => Kind::Vectors,
             Content::Report(_) => Kind::Report,
         }
     }
@@ -133,6 +152,8 @@ pub fn read(source: &Source, format: Option<Format>) -> Result<(Content, Input, 
         Content::Image(image) => image.content(),
         Content::Molecule(molecule) => molecule.content(),
         Content::Animation(clip) => clip.content(),
+        Content::Terrain(grid) => grid.content(),
+        Content::Vectors(layer) => layer.content(),
         Content::Report(documents) => report::Content {
             documents: Some(documents.len() as u64),
             ..report::Content::default()
@@ -181,6 +202,13 @@ fn parse(source: &Source, format: Format, warnings: &mut Vec<Warning>) -> Result
         Format::Pc2 => Content::Animation(pc2::read(source, warnings)?),
         Format::Mdd => Content::Animation(mdd::read(source, warnings)?),
         Format::Sanim => Content::Animation(sanim::read(source, warnings)?),
+        Format::GeoTiff => Content::Terrain(geotiff::read(source, warnings)?),
+        Format::AsciiGrid => Content::Terrain(ascii_grid::read(source, warnings)?),
+        Format::Hgt => Content::Terrain(hgt::read(source)?),
+        Format::GeoJson => Content::Vectors(geojson::read(source, warnings)?),
+        Format::Shapefile => Content::Vectors(shapefile::read(source, warnings)?),
+        Format::WktCsv => Content::Vectors(wkt_csv::read(source, warnings)?),
+        Format::Gpx => Content::Vectors(gpx::read(source, warnings)?),
         Format::Json => Content::Report(json::read(source, warnings)?),
         Format::Vdb => return Err(Fault::whole("vdb files are written, not read").into()),
     };
@@ -191,6 +219,8 @@ fn parse(source: &Source, format: Format, warnings: &mut Vec<Warning>) -> Result
         Content::Image(image) => image.check()?,
         Content::Molecule(molecule) => molecule.check()?,
         Content::Animation(clip) => clip.check()?,
+        Content::Terrain(grid) => grid.check()?,
+        Content::Vectors(layer) => layer.check()?,
         Content::Report(_) => {}
     }
     Ok(content)
@@ -225,11 +255,18 @@ fn settle(mesh: &mut Mesh, source: &Source, warnings: &mut Vec<Warning>) -> Resu
 pub fn companions(source: &Source, format: Option<Format>) -> Vec<PathBuf> {
     let bytes = source.bytes();
     let sniffed = || format::sniff(bytes, source.extension()).ok();
+    let there = |extensions: &[&str]| {
+        let names = extensions.iter().filter_map(|e| source.sibling_name(e));
+        names.collect()
+    };
     let names = match format.or_else(sniffed) {
         Some(Format::Nrrd) => nrrd::named_file(bytes).into_iter().collect(),
         Some(Format::Mhd | Format::Mha) => metaimage::named_file(bytes).into_iter().collect(),
         Some(Format::Nifti) => nifti::named_file(source).into_iter().collect(),
         Some(Format::Gltf | Format::Glb) => gltf::named_files(bytes),
+        Some(Format::Shapefile) => there(&shapefile::BESIDE),
+        Some(Format::AsciiGrid | Format::WktCsv) => there(&["prj"]),
+        Some(Format::GeoTiff) => there(geotiff::BESIDE),
         _ => Vec::new(),
     };
     let paths = names.iter().filter_map(|name| source.beside(name).ok());
@@ -300,6 +337,53 @@ pub fn read_molecule(
     match read(source, format)? {
         (Content::Molecule(molecule), input, warnings) => Ok((molecule, input, warnings)),
         (other, input, _) => Err(wrong_kind(source, &input.format, &other, &[Kind::Molecule])),
+    }
+}
+
+/// Reads heights on a map; a file of another kind is an error.
+///
+/// Grey images and arrays of two axes are heights too where `cell` says the width and height of their
+/// cells.
+pub fn read_terrain(
+    source: &Source,
+    format: Option<Format>,
+    cell: Option<[f64; 2]>,
+) -> Result<(Grid, Input, Vec<Warning>)> {
+    let (content, mut input, warnings) = read(source, format)?;
+    let refused = |refusal: Refusal| refusal.of(source);
+    let grid = match (content, cell) {
+        (Content::Terrain(grid), _) => return Ok((grid, input, warnings)),
+        (Content::Image(image), Some(_)) => {
+            heights::of_image(&image, cell).map_err(|fault| refused(fault.into()))?
+        }
+        (Content::Volume(volume), Some(_)) => {
+            heights::of_volume(&volume, cell, source.limit()).map_err(refused)?
+        }
+        (other, None) if matches!(other, Content::Image(_) | Content::Volume(_)) => {
+            let (found, format) = (other.kind().with_article(), &input.format);
+            let fault = Fault::whole(format!(
+                "holds {found} ({format}), whose cells have no size"
+            ));
+            let hint = "say how large a cell is, or use a format of terrain";
+            return Err(refused(fault.with_hint(hint).into()));
+        }
+        (other, _) => {
+            return Err(wrong_kind(source, &input.format, &other, &[Kind::Terrain]));
+        }
+    };
+    grid.check().map_err(|fault| refused(fault.into()))?;
+    input.content = grid.content();
+    Ok((grid, input, warnings))
+}
+
+/// Reads features on a map; a file of another kind is an error.
+pub fn read_vectors(
+    source: &Source,
+    format: Option<Format>,
+) -> Result<(Layer, Input, Vec<Warning>)> {
+    match read(source, format)? {
+        (Content::Vectors(layer), input, warnings) => Ok((layer, input, warnings)),
+        (other, input, _) => Err(wrong_kind(source, &input.format, &other, &[Kind::Vectors])),
     }
 }
 
@@ -426,6 +510,48 @@ pub fn write_molecule(
     }
     let output = sink.write(format, |out| writer(molecule, out))?;
     Ok((vec![output], dropped_of_molecule(molecule, format)))
+}
+
+/// Writes heights. Returns the lines for the report and warnings about what the format cannot hold.
+pub fn write_terrain(
+    grid: &Grid,
+    sink: &Sink,
+    format: Format,
+) -> Result<(Vec<Output>, Vec<Warning>)> {
+    let writer: fn(&Grid, &mut dyn Write) -> std::io::Result<()> = match format {
+        Format::GeoTiff => geotiff::write,
+        Format::AsciiGrid => ascii_grid::write,
+        _ => return Err(cannot_hold(format, Kind::Terrain)),
+    };
+    if let Some(problem) = ascii_grid::refusal(grid).filter(|_| format == Format::AsciiGrid) {
+        return Err(Error::parameter("output-format", format.name(), problem));
+    }
+    let output = sink.write(format, |out| writer(grid, out))?;
+    Ok((vec![output], dropped_of_terrain(grid, format)))
+}
+
+/// Writes features. Returns the lines for the report; nothing is lost.
+pub fn write_vectors(layer: &Layer, sink: &Sink, format: Format) -> Result<Vec<Output>> {
+    match format {
+        Format::GeoJson => Ok(vec![sink.write(format, |out| geojson::write(layer, out))?]),
+        _ => Err(cannot_hold(format, Kind::Vectors)),
+    }
+}
+
+/// Writes features with other shapes, which have heights; see [`geojson::write_raised`].
+pub fn write_raised_vectors(
+    layer: &Layer,
+    shapes: &[Raised],
+    sink: &Sink,
+    format: Format,
+) -> Result<Vec<Output>> {
+    match format {
+        Format::GeoJson => {
+            let output = sink.write(format, |out| geojson::write_raised(layer, shapes, out))?;
+            Ok(vec![output])
+        }
+        _ => Err(cannot_hold(format, Kind::Vectors)),
+    }
 }
 
 /// Writes an animation in one file: a cache of points, or GLB. Returns the lines for the report and

@@ -5,7 +5,8 @@ use crate::error::Fault;
 
 /// Tells the format by the first bytes, and by the extension where they do not tell.
 ///
-/// JSON that its extension does not name is glTF where it has the member `asset` of one. Errors
+/// JSON that its extension does not name is glTF where it has the member `asset` of one, and GeoJSON
+/// where its member `type` is of that. Errors
 /// when neither tells. Cost: linear in the bytes for such JSON, else constant.
 pub fn sniff(bytes: &[u8], extension: Option<&str>) -> Result<Format, Fault> {
     let by_name = extension.and_then(Format::from_extension);
@@ -26,6 +27,12 @@ pub fn sniff(bytes: &[u8], extension: Option<&str>) -> Result<Format, Fault> {
     }
     if let Some(is_packed) = super::las::is_packed(bytes) {
         return Ok(if is_packed { Format::Laz } else { Format::Las });
+    }
+    if super::geotiff::is_header(bytes) {
+        return Ok(Format::GeoTiff);
+    }
+    if super::shapefile::is_header(bytes) {
+        return Ok(Format::Shapefile);
     }
     if super::pcd::is_document(bytes) {
         return Ok(Format::Pcd);
@@ -55,8 +62,18 @@ pub fn sniff(bytes: &[u8], extension: Option<&str>) -> Result<Format, Fault> {
     if by_name == Some(Format::Stl) || super::stl::is_binary(bytes) {
         return Ok(Format::Stl);
     }
+    if by_name == Some(Format::SpheresCsv) && super::wkt_csv::is_document(bytes) {
+        return Ok(Format::WktCsv);
+    }
     if by_name == Some(Format::SpheresCsv) && super::xyz::is_document(bytes) {
         return Ok(Format::PointsCsv);
+    }
+    if by_name == Some(Format::Json) && super::geojson::is_document(super::json::unmarked(bytes)) {
+        return Ok(Format::GeoJson);
+    }
+    // Where a name such as `.asc` or `.txt` tells one of points.
+    if by_name.is_none_or(|format| format == Format::Xyz) && super::ascii_grid::is_document(bytes) {
+        return Ok(Format::AsciiGrid);
     }
     // Names such as `.txt` tell little: whatever text is known goes before them.
     if let Some(format) = by_name.filter(|format| *format != Format::Xyz) {
@@ -76,9 +93,19 @@ pub fn sniff(bytes: &[u8], extension: Option<&str>) -> Result<Format, Fault> {
     if super::vti::is_document(text) {
         return Ok(Format::Vti);
     }
+    if super::gpx::is_document(text) {
+        return Ok(Format::Gpx);
+    }
     if text.starts_with(b"{") || text.starts_with(b"[") {
-        let is_gltf = super::gltf::is_document(text);
-        return Ok(if is_gltf { Format::Gltf } else { Format::Json });
+        if super::gltf::is_document(text) {
+            return Ok(Format::Gltf);
+        }
+        let is_map = super::geojson::is_document(text);
+        return Ok(if is_map {
+            Format::GeoJson
+        } else {
+            Format::Json
+        });
     }
     if super::mmcif::is_document(text) {
         return Ok(Format::Cif);
@@ -86,6 +113,9 @@ pub fn sniff(bytes: &[u8], extension: Option<&str>) -> Result<Format, Fault> {
     if super::pdb::is_document(text) {
         let is_pqr = super::pqr::is_document(text);
         return Ok(if is_pqr { Format::Pqr } else { Format::Pdb });
+    }
+    if super::wkt_csv::is_document(text) {
+        return Ok(Format::WktCsv);
     }
     if super::xyzr::is_document(text) {
         return Ok(Format::SpheresCsv);

@@ -167,6 +167,32 @@ impl Source {
         }
     }
 
+    /// The bytes of the file with the same name but this extension, in lower case or in capitals, if it
+    /// is there; see [`Source::companion`].
+    pub fn sibling(&self, extension: &str) -> Result<Option<Vec<u8>>, Refusal> {
+        match self.sibling_name(extension) {
+            Some(name) => self.companion(&name).map(Some),
+            None => Ok(None),
+        }
+    }
+
+    /// The name of the file with the same name but this extension, if it is there.
+    pub fn sibling_name(&self, extension: &str) -> Option<String> {
+        if self.name == "-" {
+            return None;
+        }
+        let mut spelled = [extension.to_owned(), extension.to_ascii_uppercase()].into_iter();
+        spelled.find_map(|extension| {
+            let below = match self.path.extension() {
+                Some(last) if last.eq_ignore_ascii_case("gz") => self.path.with_extension(""),
+                _ => self.path.clone(),
+            };
+            let path = below.with_extension(extension);
+            let name = path.file_name()?.to_str()?.to_owned();
+            path.is_file().then_some(name)
+        })
+    }
+
     /// Where a file that this one names is, by the rules of [`Source::companion`]; it need not be
     /// there.
     pub fn beside(&self, name: &str) -> Result<PathBuf, Fault> {
