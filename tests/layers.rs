@@ -53,15 +53,15 @@ const MAY_USE: &[(&str, &[&str])] = &[
     (
         "terrain",
         &[
-            "camera", "error", "image", "mesh", "numeric", "progress", "render", "report",
-            "spatial", "trade", "vector",
+            "camera", "error", "image", "numeric", "progress", "report", "spatial", "trade",
+            "vector",
         ],
     ),
     (
         "measure",
         &[
-            "anim", "error", "image", "mesh", "numeric", "points", "progress", "protein", "report",
-            "spatial", "terrain", "trade", "vector", "volume",
+            "anim", "camera", "error", "image", "mesh", "numeric", "points", "progress", "protein",
+            "report", "spatial", "terrain", "trade", "vector", "volume",
         ],
     ),
     // Data types only: a reader calls no algorithm.

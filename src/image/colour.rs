@@ -85,6 +85,15 @@ fn along(stops: &[Srgb], t: f64) -> Srgb {
     })
 }
 
+/// The colour of `RRGGBB`, with or without `#` before it.
+pub fn from_hex(text: &str) -> Option<Srgb> {
+    let digits = text.strip_prefix('#').unwrap_or(text);
+    let is_six = digits.len() == 6 && digits.bytes().all(|b| b.is_ascii_hexdigit());
+    let number = u32::from_str_radix(digits, 16).ok().filter(|_| is_six)?;
+    let [_, colour @ ..] = number.to_be_bytes();
+    Some(colour)
+}
+
 /// The light of a byte on the sRGB curve (IEC 61966-2-1).
 pub fn byte_to_linear(byte: u8) -> f32 {
     let v = f64::from(byte) / 255.0;

@@ -1,10 +1,12 @@
 //! Judging results: errors between two things of one kind.
 
 pub mod animation_error;
+pub mod drape_error;
 mod hausdorff;
 pub mod image_difference;
 pub mod mesh_distance;
 pub mod normal_error;
+pub mod overlay_error;
 pub mod passage;
 pub mod report_difference;
 mod sides;

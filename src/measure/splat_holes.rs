@@ -118,7 +118,7 @@ pub fn holes(truth: &Truth, splats: &[Splat], tolerance: f64, views: Views) -> H
             };
             let place = |p: &Vec3| frame.to_local(*p);
             local.positions = mesh.positions.iter().map(place).collect();
-            Surface::Mesh(Tracer::new(&local), local)
+            Surface::Mesh(Box::new((Tracer::new(&local), local)))
         }
     };
     let disc = |s: &Splat| Piece {
@@ -153,7 +153,7 @@ pub fn holes(truth: &Truth, splats: &[Splat], tolerance: f64, views: Views) -> H
 /// The truth in the frame of the views.
 enum Surface {
     Pieces(Vec<Piece>),
-    Mesh(Tracer, Mesh),
+    Mesh(Box<(Tracer, Mesh)>),
 }
 
 /// One of directions spread evenly over the sphere.
@@ -203,10 +203,10 @@ impl Screen {
     fn judge(&self, surface: &Surface, discs: &[Piece], tolerance: f64) -> (u64, u64) {
         let wanted = match surface {
             Surface::Pieces(pieces) => self.draw(pieces),
-            Surface::Mesh(tracer, mesh) => (0..self.size * self.size)
+            Surface::Mesh(mesh) => (0..self.size * self.size)
                 .into_par_iter()
                 .with_min_len(256)
-                .map(|i| self.hit(i % self.size, i / self.size, tracer, mesh))
+                .map(|i| self.hit(i % self.size, i / self.size, &mesh.0, &mesh.1))
                 .collect(),
         };
         let found = self.draw(discs);

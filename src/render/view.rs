@@ -48,7 +48,8 @@ impl View {
         Ok(Camera::look_at(eye, target, up, fov))
     }
 
-    pub(super) fn check(&self) -> Result<()> {
+    /// Errs where it has numbers that are not finite, or no direction.
+    pub fn check(&self) -> Result<()> {
         let all = [self.eye, self.target, self.up].concat();
         let wrong = |problem: &str| Err(self.wrong(problem));
         if !all.iter().all(|v| v.is_finite()) || !self.fov_deg.is_finite() {

@@ -1,7 +1,9 @@
 //! Features on a map: points, lines and polygons in two dimensions, with properties.
 
 pub mod crs;
+pub mod index;
 pub mod inventory;
+pub mod rings;
 
 use crate::error::Fault;
 use crate::report;
