@@ -4,8 +4,9 @@ use crate::exit::Exit;
 use crate::streams::say;
 use crate::trade::{Declared, TABLE};
 use crate::{
-    compare, completions, compress_anim, convert, formats, info, isosurface, man, schema, shadow,
-    smooth_mc, splat_gen, splat_trace, stability, tradeoff, tunnels, voxelize,
+    compare, completions, compress_anim, convert, drape, formats, info, isosurface, man, schema,
+    shadow, smooth_mc, splat_gen, splat_trace, stability, tradeoff, tunnels, vector_overlay,
+    voxelize,
 };
 use clap::error::ErrorKind;
 use clap::{Arg, CommandFactory, FromArgMatches, Parser, Subcommand};
@@ -33,6 +34,8 @@ pub enum Command {
     Tunnels(Box<tunnels::Args>),
     SplatGen(Box<splat_gen::Args>),
     SplatTrace(Box<splat_trace::Args>),
+    VectorOverlay(Box<vector_overlay::Args>),
+    Drape(Box<drape::Args>),
     CompressAnim(compress_anim::Args),
     Info(info::Args),
     Compare(compare::Args),
@@ -51,6 +54,7 @@ const GROUPS: &[(&str, &[&str])] = &[
     ("Mesh to picture", &["shadow"]),
     ("Volume to mesh", &["smooth-mc", "isosurface"]),
     ("Points", &["splat-gen", "splat-trace"]),
+    ("Maps", &["vector-overlay", "drape"]),
     ("Molecules", &["tunnels"]),
     ("Animations", &["compress-anim"]),
     ("Any file", &["info", "convert", "compare"]),

@@ -13,6 +13,7 @@ use scantle::anim::Clip;
 use scantle::error::{Error, Result};
 use scantle::image::samples::Image;
 use scantle::io::format::{Format, Kind};
+use scantle::io::geotiff::Raster;
 use scantle::io::sink::Sink;
 use scantle::io::source::Source;
 use scantle::io::{self, Content};
@@ -22,7 +23,8 @@ use scantle::progress::Progress;
 use scantle::protein::Molecule;
 use scantle::report::{Input, Output, Report, Run, SCHEMA, Stage, Warning};
 use scantle::terrain::Grid;
-use scantle::vector::Layer;
+use scantle::terrain::Transform;
+use scantle::vector::{Layer, Raised};
 use scantle::volume::Volume;
 use serde::Serialize;
 use serde_json::Value;
@@ -370,6 +372,27 @@ impl<'a> Job<'a> {
     pub fn write_vectors(&mut self, layer: &Layer) -> Result<()> {
         self.write_with(Kind::Vectors, |sink, format| {
             io::write_vectors(layer, sink, format).map(|outputs| (outputs, Vec::new()))
+        })
+    }
+
+    /// Writes a picture, with a world file beside it where it has a place on the map, if the user wants it.
+    pub fn write_map(&mut self, image: &Image, place: Option<&Transform>) -> Result<()> {
+        self.write_with(Kind::Image, |sink, format| {
+            Ok((io::write_map(image, place, sink, format)?, Vec::new()))
+        })
+    }
+
+    /// Writes a raster on the map, if the user wants it.
+    pub fn write_raster(&mut self, raster: &Raster) -> Result<()> {
+        self.write_with(Kind::Terrain, |sink, format| {
+            Ok((io::write_raster(raster, sink, format)?, Vec::new()))
+        })
+    }
+
+    /// Writes features with heights, if the user wants them.
+    pub fn write_raised_vectors(&mut self, layer: &Layer, shapes: &[Raised]) -> Result<()> {
+        self.write_with(Kind::Vectors, |sink, format| {
+            io::write_raised_vectors(layer, shapes, sink, format).map(|all| (all, Vec::new()))
         })
     }
 

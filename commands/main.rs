@@ -9,6 +9,7 @@ mod destination;
 mod exit;
 mod found;
 mod job;
+mod land;
 mod machine;
 mod places;
 mod progress;
@@ -25,6 +26,7 @@ mod compare;
 mod completions;
 mod compress_anim;
 mod convert;
+mod drape;
 mod formats;
 mod info;
 mod isosurface;
@@ -37,6 +39,7 @@ mod splat_trace;
 mod stability;
 mod tradeoff;
 mod tunnels;
+mod vector_overlay;
 mod voxelize;
 
 use cli::Command;
@@ -57,6 +60,8 @@ fn run(command: &Command) -> Exit {
         Command::Shadow(args) => shadow::run(args),
         Command::SplatGen(args) => splat_gen::run(args),
         Command::SplatTrace(args) => splat_trace::run(args),
+        Command::VectorOverlay(args) => vector_overlay::run(args),
+        Command::Drape(args) => drape::run(args),
         Command::SmoothMc(args) => smooth_mc::run(args),
         Command::Isosurface(args) => isosurface::run(args),
         Command::Tunnels(args) => tunnels::run(args),

@@ -3,8 +3,8 @@
 use crate::exit::Exit;
 use crate::streams::print;
 use crate::{
-    compare, compress_anim, convert, formats, info, isosurface, shadow, smooth_mc, splat_gen,
-    splat_trace, stability, tradeoff, tunnels, voxelize, words,
+    compare, compress_anim, convert, drape, formats, info, isosurface, shadow, smooth_mc,
+    splat_gen, splat_trace, stability, tradeoff, tunnels, vector_overlay, voxelize, words,
 };
 use clap::builder::PossibleValuesParser;
 use scantle::error::Result;
@@ -43,6 +43,8 @@ const SCHEMAS: &[Row] = &[
     ("smooth-mc", || schema_for!(smooth_mc::Report)),
     ("splat-gen", || schema_for!(splat_gen::Report)),
     ("splat-trace", || schema_for!(splat_trace::Report)),
+    ("vector-overlay", || schema_for!(vector_overlay::Report)),
+    ("drape", || schema_for!(drape::Report)),
     ("stability", || schema_for!(stability::Report)),
     ("tradeoff", || schema_for!(tradeoff::Report)),
     ("voxelize", || schema_for!(voxelize::Report)),

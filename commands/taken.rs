@@ -9,7 +9,16 @@ use std::fs;
 use std::path::{Component, Path, PathBuf};
 
 /// The options that name a file to read beside the inputs, in every command that has them.
-pub const READ: &[&str] = &["radii", "reference", "label-names", "base", "mesh"];
+pub const READ: &[&str] = &[
+    "radii",
+    "reference",
+    "label-names",
+    "base",
+    "mesh",
+    "terrain",
+    "vectors",
+    "style",
+];
 
 /// A file that is read.
 #[derive(Debug, Clone, PartialEq, Eq)]

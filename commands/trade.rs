@@ -4,6 +4,7 @@ use scantle::anim::compress;
 use scantle::points::splat;
 use scantle::protein::tunnels;
 use scantle::render::{shadow, splats};
+use scantle::terrain::overlay;
 use scantle::trade::Trade;
 use scantle::volume::{smooth_mc, voxelize};
 
@@ -45,11 +46,16 @@ pub const TABLE: &[(&str, Declared)] = &[
     ("tunnels", Declared::Trade(&tunnels::TRADE)),
     ("splat-gen", Declared::Trade(&splat::TRADE)),
     ("splat-trace", Declared::Trade(&splats::TRADE)),
+    ("vector-overlay", Declared::Trade(&overlay::TRADE)),
     ("compress-anim encode", Declared::Trade(&compress::TRADE)),
     ("compress-anim", Declared::None("its verb `encode` has one")),
     (
         "isosurface",
         Declared::None("its vertices lie where linear interpolation meets the level"),
+    ),
+    (
+        "drape",
+        Declared::None("what it lays on triangles is on them but for roundings"),
     ),
     (
         "compare",
@@ -173,6 +179,19 @@ mod tests {
         }
     }
 
+    /// Words for all that a command must be given.
+    fn inputs(name: &str) -> Vec<String> {
+        let all = cli::command();
+        let definition = cli::find(&all, name).expect("a command");
+        let needed = definition
+            .get_arguments()
+            .filter(|arg| arg.is_required_set());
+        let option = |arg: &clap::Arg| arg.get_long().map(|long| format!("--{long}"));
+        needed
+            .flat_map(|arg| option(arg).into_iter().chain(["a.ply".to_owned()]))
+            .collect()
+    }
+
     #[test]
     fn every_knob_is_an_option_and_takes_its_ladder() {
         for (name, declared) in TABLE {
@@ -184,8 +203,10 @@ mod tests {
                 assert!(knob.ladder.len() > 1, "{name} --{}", knob.name);
                 for value in knob.ladder {
                     let option = format!("--{}", knob.name);
-                    let words = name.split(' ').chain(["a.ply", &option, value]);
-                    let takes = takes_words(&words.map(str::to_owned).collect::<Vec<_>>());
+                    let mut words: Vec<String> = name.split(' ').map(str::to_owned).collect();
+                    words.extend(inputs(name));
+                    words.extend([option, (*value).to_owned()]);
+                    let takes = takes_words(&words);
                     assert!(takes, "{name} --{} {value}", knob.name);
                 }
             }

@@ -240,7 +240,7 @@ mod tests {
         let why = |line| wrapped(line).expect_err("a refusal");
         assert_eq!(
             why("nonsense a"),
-            "there is no command nonsense; those with a trade: voxelize, shadow, smooth-mc, tunnels, splat-gen, splat-trace, compress-anim encode"
+            "there is no command nonsense; those with a trade: voxelize, shadow, smooth-mc, tunnels, splat-gen, splat-trace, vector-overlay, compress-anim encode"
         );
         assert_eq!(why("info a"), "info has no trade: it counts, exactly");
         assert_eq!(

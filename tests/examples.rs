@@ -111,7 +111,9 @@ fn the_help_of_each_command_ends_with_two_examples_that_run() {
         let (_, examples) = help
             .split_once("\nExamples:\n")
             .unwrap_or_else(|| panic!("the help of {command} shows no examples"));
-        let examples: Vec<&str> = examples.trim_end().lines().map(str::trim).collect();
+        // Lines that end with a backslash go on.
+        let examples = examples.trim_end().replace("\\\n", " ");
+        let examples: Vec<&str> = examples.lines().map(str::trim).collect();
         assert_eq!(examples.len(), 2, "{command}: {examples:?}");
         for example in examples {
             assert!(

@@ -259,7 +259,7 @@ fn what_cannot_be_varied_is_refused_with_words() {
     for (line, why) in [
         (
             "tradeoff nonsense a --vary mode",
-            "tradeoff: there is no command nonsense; those with a trade: voxelize, shadow, smooth-mc, tunnels, splat-gen, splat-trace, compress-anim encode",
+            "tradeoff: there is no command nonsense; those with a trade: voxelize, shadow, smooth-mc, tunnels, splat-gen, splat-trace, vector-overlay, compress-anim encode",
         ),
         (
             "tradeoff info a --vary mode",

@@ -1,6 +1,6 @@
 //! Colours and materials as the command line writes them.
 
-use scantle::image::colour::Srgb;
+use scantle::image::colour::{Srgb, from_hex};
 use scantle::render::splats::Material;
 
 /// Most objects that materials may be given for.
@@ -8,11 +8,7 @@ const MOST_OBJECTS: usize = 1 << 16;
 
 /// `#RRGGBB`.
 pub fn colour(text: &str) -> Result<Srgb, String> {
-    let digits = text.strip_prefix('#').unwrap_or(text);
-    let is_six = digits.len() == 6 && digits.bytes().all(|b| b.is_ascii_hexdigit());
-    let number = u32::from_str_radix(digits, 16).ok().filter(|_| is_six);
-    let [_, colour @ ..] = number.map(u32::to_be_bytes).ok_or("not #RRGGBB")?;
-    Ok(colour)
+    from_hex(text).ok_or_else(|| "not #RRGGBB".to_owned())
 }
 
 /// What is said of the look of an object.

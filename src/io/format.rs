@@ -52,7 +52,7 @@ impl Kind {
             Kind::Molecule => "a molecule",
             Kind::Animation => "an animation",
             Kind::Terrain => "a terrain",
-            Kind::Vectors => "features on a map",
+            Kind::Vectors => "a layer of features",
             Kind::Report => "a report",
         }
     }

@@ -75,6 +75,8 @@ use crate::points::Splats;
 use crate::protein::Molecule;
 use crate::report::{self, Input, Output, Tally, Warning};
 use crate::terrain::Grid;
+use crate::terrain::Transform;
+use crate::terrain::style::Sheet;
 use crate::vector::{Layer, Raised};
 use crate::volume::Volume;
 use crate::volume::bits::BitGrid;
@@ -487,6 +489,46 @@ pub fn write_image(image: &Image, sink: &Sink, format: Format) -> Result<Vec<Out
         Format::Png => Ok(vec![sink.write(format, |out| png::write(image, out))?]),
         _ => Err(cannot_hold(format, Kind::Image)),
     }
+}
+
+/// Writes a picture that may have a place on the map: then a file beside it says where its pixels are,
+/// for all but standard output.
+pub fn write_map(
+    image: &Image,
+    place: Option<&Transform>,
+    sink: &Sink,
+    format: Format,
+) -> Result<Vec<Output>> {
+    let mut outputs = write_image(image, sink, format)?;
+    if let (Some(transform), Sink::File(path)) = (place, sink) {
+        let beside = Sink::File(path.with_extension("pgw"));
+        let text = world::write(transform);
+        outputs.push(beside.write_as("world", |out| out.write_all(text.as_bytes()))?);
+    }
+    Ok(outputs)
+}
+
+/// Writes a raster of one band on the map.
+pub fn write_raster(raster: &geotiff::Raster, sink: &Sink, format: Format) -> Result<Vec<Output>> {
+    match format {
+        Format::GeoTiff => Ok(vec![
+            sink.write(format, |out| geotiff::write_raster(raster, out))?,
+        ]),
+        _ => Err(cannot_hold(format, Kind::Terrain)),
+    }
+}
+
+/// Reads a style sheet; see [`Sheet`].
+pub fn read_style(source: &Source) -> Result<(Sheet, Input)> {
+    let refused = |fault: Fault| Refusal::from(fault).of(source);
+    let text = std::str::from_utf8(source.bytes())
+        .map_err(|error| refused(Fault::byte(error.valid_up_to(), "is no UTF-8 text")))?;
+    let sheet = Sheet::from_json(text).map_err(refused)?;
+    let content = report::Content {
+        documents: Some(1),
+        ..report::Content::default()
+    };
+    Ok((sheet, input(source, Format::Json, source.sha256(), content)))
 }
 
 /// Writes a molecule. Returns the lines for the report and warnings about what the format cannot hold.

@@ -44,6 +44,14 @@ fn parse(bytes: &[u8]) -> Result<Transform, Fault> {
     }
 }
 
+/// The six lines of a transform.
+pub fn write(transform: &Transform) -> String {
+    let [x, y] = transform.place(0.5, 0.5);
+    let (a, d) = (transform.across, transform.down);
+    let lines = [a[0], a[1], d[0], d[1], x, y].map(|n| format!("{n:?}\n"));
+    lines.concat()
+}
+
 /// Cells of size 1 counted from the lower left corner, for rasters that have no place.
 pub fn of_cells(rows: usize) -> Transform {
     Transform::north_up([0.0, rows as f64], [1.0, 1.0])
